@@ -1,4 +1,4 @@
-//! Colour of the noise that a fit leaves, and the covariance of the fit in it.
+//! Colour of the residual noise of a fit, and the covariance of the fit for such noise.
 //!
 //! ```text
 //! S(f) = Σ_s |R_s(f)|² / Σ_s n_s (1 − h_s(f)),   h_s(f) = Σ_j |Q_sj(f)|² / n_s
@@ -6,23 +6,25 @@
 //! Cov = R⁻¹ Qᵀ Ω Q R⁻ᵀ
 //! ```
 //!
-//! R_s: transform of the residual of stretch s with n_s samples; Q R = J: the derivatives by all parameters; h_s: part of
-//! the noise that the fit absorbs at a frequency f in cycles per sample; a_k, v: autoregression of the order that
-//! minimises Akaike's criterion, from the autocovariances of S by Levinson's recursion; Ω: covariance of the noise with
-//! that spectrum. For white noise, Cov is s² (JᵀJ)⁻¹. (P. Stoica, R. Moses, Spectral Analysis of Signals, 2005, 3.4;
-//! W. K. Newey, K. D. West, Econometrica 55 (1987), 703, for covariances of this form.)
+//! R_s: transform of the residual of segment s with n_s samples; Q R = J: the derivatives with respect to all
+//! parameters; h_s: fraction of the noise absorbed by the fit at a frequency f in cycles per sample; a_k, v:
+//! autoregression of the order that minimises Akaike's criterion, from the autocovariances of S by Levinson's
+//! recursion; Ω: covariance of the noise with that spectrum. For white noise, Cov is s² (JᵀJ)⁻¹. (P. Stoica, R. Moses,
+//! Spectral Analysis of Signals, 2005, 3.4; W. K. Newey, K. D. West, Econometrica 55 (1987), 703, for covariances of
+//! this form.)
 //!
-//! The spectrum itself is known from n samples only, so that a variance u = Σ_f w(f) S(f) has as many degrees of freedom
+//! The spectrum itself is estimated from only n samples, so a variance u = Σ_f w(f) S(f) has as many degrees of freedom
 //! as a chi-square of the same relative variance; the standard uncertainty is enlarged by Student's quantile for them,
-//! so that ±1.96 of it include 95 %:
+//! so that ±1.96 of it cover 95 %:
 //!
 //! ```text
 //! ν = 2 u²/var(u),   var(u) = 2 u²/n + (∂u/∂a)ᵀ (v/n) Γ⁻¹ (∂u/∂a),   ∂S/∂a_k = 2 S Re(e^(−j2πfk)/(1 − Σ a_m e^(−j2πfm)))
 //! ```
 //!
-//! An autoregression does not resolve a narrow peak. Where one is to be expected, the spectrum is multiplied by what the
-//! residuals have of it around each frequency, `Σ_b |R|² / Σ_b E|R|²` over the bins b within a half-width, and
-//! `var(u) = (m/n) Σ_f ū(f)²` with `ū` the parts of u averaged over the same bins and m the length of the transform.
+//! An autoregression does not resolve a narrow peak. Where one is expected, the spectrum is multiplied by the ratio
+//! of the residuals' power to its expectation around each frequency, `Σ_b |R|² / Σ_b E|R|²` over the bins b within a
+//! half-width, and `var(u) = (m/n) Σ_f ū(f)²` with `ū` the contributions to u averaged over the same bins and m the
+//! length of the transform.
 //!
 //! Γ: autocovariances of the noise, p by p. (JCGM 100:2008, G.4; P. J. Brockwell, R. A. Davis, Time Series, 1991, 8.1.)
 
@@ -34,14 +36,14 @@ use num_complex::Complex64;
 
 use crate::student::student;
 
-/// Highest order of the autoregression, and fewest samples for each order.
+/// Maximum order of the autoregression, and minimum number of samples per order.
 const MOST_ORDERS: usize = 40;
 const SAMPLES_PER_ORDER: usize = 10;
-/// Largest part of the noise that counts as absorbed at a frequency.
+/// Largest fraction of the noise that counts as absorbed at a frequency.
 const MOST_ABSORBED: f64 = 0.8;
-/// How often the colour is learnt again with what the fit absorbs of noise of the last colour.
+/// Number of re-estimates of the colour with the absorption for noise of the last colour.
 const REFINEMENTS: usize = 2;
-/// Fewest degrees of freedom, below which their linear estimate means nothing.
+/// Minimum degrees of freedom for a meaningful linear estimate.
 const LEAST_FREEDOM: f64 = 2.0;
 
 /// An autoregression of noise, in samples.
@@ -52,38 +54,38 @@ pub struct NoiseColour {
     innovation: f64,
     /// Autocovariances from lag 0, which is the variance of the noise, to the order.
     covariances: Vec<f64>,
-    /// Samples that it is known from.
+    /// Number of samples that it was estimated from.
     count: usize,
-    /// What the spectrum has beside that of the autoregression, if it is resolved further.
+    /// Correction to the spectrum of the autoregression, if it is resolved more finely.
     detail: Option<SpectrumDetail>,
 }
 
-/// Factors on a spectrum, averages over neighbouring bins.
+/// Factors on a spectrum, averaged over neighbouring bins.
 #[derive(Debug, Clone, PartialEq)]
 struct SpectrumDetail {
-    /// One for each bin.
+    /// One per bin.
     factors: Vec<f64>,
-    /// Bins to each side over which they are averages.
+    /// Half-width of the averages, in bins.
     half_width: usize,
 }
 
-/// Fewest bins to each side over which a spectrum is averaged, in those of the record.
+/// Minimum half-width for averaging a spectrum, in bins of the record.
 const LEAST_HALF_WIDTH: f64 = 4.0;
 
-/// Residuals of a stretch with the transforms of its orthonormal derivatives.
+/// Residuals of a segment with the transforms of its orthonormalised derivatives.
 struct Transformed {
     count: usize,
     residual: Vec<Complex64>,
     columns: Vec<Vec<Complex64>>,
 }
 
-/// The colour of the noise in each group of stretches, and the covariance of the parameters; `None` if the derivatives are
-/// dependent.
+/// The noise colour of each group of segments, and the covariance of the parameters; `None` if the derivatives are
+/// linearly dependent.
 ///
-/// `stretches`: residuals of each stretch; `groups`: stretches of one sampling rate; `jacobian`: derivatives by the
-/// parameters, over all stretches. If `wanted` is not 0, the colour allows for what the fit absorbs of it, and the first
-/// `wanted` parameters for what is not known of the spectrum. With `peaks_rad`, peaks of that half-width in rad per sample are
-/// resolved.
+/// `stretches`: residuals of each segment; `groups`: segments of one sampling rate; `jacobian`: derivatives with
+/// respect to the parameters, over all segments. If `wanted` is not 0, the colour allows for absorption by the fit, and
+/// the covariance of the first `wanted` parameters for the uncertainty of the spectrum. With `peaks_rad`, peaks of that
+/// half-width in rad per sample are resolved.
 pub fn learn(
     stretches: &[Vec<f64>],
     groups: &[Range<usize>],
@@ -127,8 +129,8 @@ pub fn learn(
     is_finite.then_some((colours, covariance))
 }
 
-/// The colour of each group of stretches and QᵀΩQ, of as many rows as there are `parameters`; refined for what the fit absorbs,
-/// and with peaks of that half-width in rad per sample, if asked for.
+/// The noise colour of each group of segments and QᵀΩQ, of as many rows as there are `parameters`; refined for
+/// absorption by the fit, and with peaks of that half-width in rad per sample, if requested.
 fn colours_of(
     groups: &[&[Transformed]],
     size: usize,
@@ -198,7 +200,7 @@ fn inverse(spectrum: &mut [Complex64], size: usize) -> Vec<f64> {
 }
 
 impl Transformed {
-    /// Expected |R(f)|² where the noise has that density, and no less than what a fit leaves at most frequencies.
+    /// Expected |R(f)|² for noise of this density, at least what a fit leaves at most frequencies.
     fn left(&self, density: &[f64], size: usize, middle: &DMatrix<f64>) -> Vec<f64> {
         let least = (1.0 - MOST_ABSORBED) * self.count as f64;
         let each = self.expected(density, size, middle);
@@ -206,7 +208,7 @@ impl Transformed {
         pairs.map(|(e, s)| e.max(least * s)).collect()
     }
 
-    /// Expected |R(f)|² where the noise has that density.
+    /// Expected |R(f)|² for noise of this density.
     fn expected(&self, density: &[f64], size: usize, middle: &DMatrix<f64>) -> Vec<f64> {
         let forward = torqcomp_fourier::forward(size);
         let transform = |mut samples: Vec<f64>| {
@@ -243,7 +245,7 @@ impl Transformed {
     }
 }
 
-/// For each bin the power of the residuals, and that expected of them.
+/// Power of the residuals and its expectation, per bin.
 fn powers(
     stretches: &[Transformed],
     size: usize,
@@ -260,7 +262,7 @@ fn powers(
     sums
 }
 
-/// For each value the sum of those around it, and how many these are.
+/// Sum and number of the values around each value.
 fn around(values: impl Iterator<Item = f64>, half_width: usize) -> Vec<(f64, f64)> {
     let mut sums = vec![0.0];
     for value in values {
@@ -278,7 +280,7 @@ fn around(values: impl Iterator<Item = f64>, half_width: usize) -> Vec<(f64, f64
 }
 
 impl NoiseColour {
-    /// White noise of that variance, from so many samples.
+    /// White noise of this variance, from `count` samples.
     pub fn white(variance: f64, count: usize) -> Self {
         Self {
             coefficients: Vec::new(),
@@ -289,7 +291,7 @@ impl NoiseColour {
         }
     }
 
-    /// The colour of residuals, if the residuals of noise of that colour, whose density is given, have that expectation.
+    /// Noise colour of residuals, given their expectation for noise of a known density.
     fn of(
         stretches: &[Transformed],
         size: usize,
@@ -306,7 +308,7 @@ impl NoiseColour {
         Self::from_autocovariances(&covariances, count)
     }
 
-    /// The colour as if the noise were white.
+    /// Initial estimate, as if the noise were white.
     fn first(stretches: &[Transformed], size: usize) -> Self {
         let expected = |stretch: &Transformed| {
             let count = stretch.count as f64;
@@ -318,14 +320,15 @@ impl NoiseColour {
         Self::of(stretches, size, expected, |_| 1.0)
     }
 
-    /// The colour that the residuals show if the fit absorbs noise of this colour; `middle`: QᵀΩQ.
+    /// Noise colour of the residuals, assuming that the fit absorbs noise of the present colour;
+    /// `middle`: QᵀΩQ.
     fn refined(&self, stretches: &[Transformed], size: usize, middle: &DMatrix<f64>) -> Self {
         let density = self.of_bins(size);
         let expected = |stretch: &Transformed| stretch.left(&density, size, middle);
         Self::of(stretches, size, expected, |k| density[k])
     }
 
-    /// The same with the peaks that the residuals show, of a half-width in rad per sample.
+    /// The same with the peaks of the residuals resolved, with a half-width in rad per sample.
     fn with_detail(
         self,
         stretches: &[Transformed],
@@ -363,7 +366,7 @@ impl NoiseColour {
         (0..=size / 2).map(of_bin).collect()
     }
 
-    /// The autoregression of the order with the least criterion, by Levinson's recursion.
+    /// The autoregression of the order that minimises the criterion, by Levinson's recursion.
     fn from_autocovariances(covariances: &[f64], count: usize) -> Self {
         let known = covariances.len() - 1;
         let most = MOST_ORDERS.min(count / SAMPLES_PER_ORDER).min(known);
@@ -400,7 +403,8 @@ impl NoiseColour {
         best
     }
 
-    /// S at an angular frequency in rad per sample: the variance of white noise with as much power there.
+    /// S at an angular frequency in rad per sample: the variance of white noise with the same power
+    /// there.
     pub fn density(&self, rad_per_sample: f64) -> f64 {
         self.innovation / self.whitener(rad_per_sample).norm_sqr()
     }
@@ -419,7 +423,8 @@ impl NoiseColour {
         self.covariances[0]
     }
 
-    /// S at an angular frequency in rad per sample over the variance of the noise; 1 for white noise.
+    /// S at an angular frequency in rad per sample relative to the variance of the noise; 1 for white
+    /// noise.
     pub fn relative_density(&self, rad_per_sample: f64) -> f64 {
         match self.variance() > 0.0 {
             true => self.density(rad_per_sample) / self.variance(),
@@ -427,7 +432,7 @@ impl NoiseColour {
         }
     }
 
-    /// Power of the noise in each bin of a transform, with that of its mirror image.
+    /// Noise power in each bin of a transform, including its mirror image.
     fn densities(&self, size: usize) -> Vec<f64> {
         let bins = self.of_bins(size).into_iter().enumerate();
         let of_bin = |(k, density): (usize, f64)| {
@@ -437,7 +442,7 @@ impl NoiseColour {
         bins.map(of_bin).collect()
     }
 
-    /// var(u) of the variances u that the noise gives the sums of the columns times the factors in each of these rows.
+    /// var(u) of the noise variances u of the sums of the columns times the factors in each of these rows.
     fn variances_of_variances(
         &self,
         stretches: &[Transformed],
@@ -525,7 +530,7 @@ mod tests {
         let found = NoiseColour::from_autocovariances(&covariances, 300);
         assert_eq!(found.coefficients.len(), 1);
         assert!((found.coefficients[0] - 0.8).abs() < 1e-12);
-        // 1/(1 − 0.8)² at rest, 1/(1 + 0.8)² at half the rate.
+        // 1/(1 − 0.8)² at DC, 1/(1 + 0.8)² at the Nyquist frequency.
         assert!((found.density(0.0) - 25.0).abs() < 1e-9);
         assert!((found.density(std::f64::consts::PI) - 1.0 / 3.24).abs() < 1e-9);
         assert!((found.relative_density(0.0) - 9.0).abs() < 1e-9);

@@ -1,9 +1,9 @@
-//! Every sample recording through every verb that reads: all of them take the same channel, with the same name, unit,
-//! number of samples, rate and start, and warn of the same things.
+//! Every sample recording through every command that reads: all of them select the same channel, with the same name,
+//! unit, number of samples, rate and start, and give the same warnings.
 //!
-//! `tests/recordings/disagreements.txt` lists where they do not, a sample each. The file is compared as a whole, so that
-//! neither a new difference nor one that is gone passes unnoticed; `SNAPSHOTS=overwrite cargo test --test tests
-//! agreement` writes it anew.
+//! `tests/recordings/disagreements.txt` lists the exceptions, one sample per line. The file is compared as a whole, so
+//! that neither a new difference nor a resolved one goes unnoticed;
+//! `SNAPSHOTS=overwrite cargo test --test tests agreement` rewrites it.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -27,7 +27,7 @@ const MCAP: [(&str, &str, &str); 5] = [
     ("made/damaged.mcap", "/joint_states", "effort[0]"),
 ];
 
-/// Beginnings of the codes of warnings about reading. The others are about the signal or the verb's own work.
+/// Prefixes of warning codes about reading. The others are about the signal or the command's own work.
 const READING: [&str; 16] = [
     "extra-cells",
     "lines-skipped",
@@ -47,7 +47,7 @@ const READING: [&str; 16] = [
     "zero-bytes",
 ];
 
-/// Reasons to refuse a recording, and parts of the messages that give them.
+/// Reasons for rejecting a recording, and parts of the corresponding messages.
 const REASONS: [(&str, &[&str]); 5] = [
     ("option", &["unexpected argument"]),
     (
@@ -95,10 +95,11 @@ const REASONS: [(&str, &[&str]); 5] = [
     ),
 ];
 
-/// Verbs that refuse a good recording for what its signal is, in words of their own: too short, slow or still.
+/// Commands that reject a good recording because of its signal, with their own messages: too short, slow or
+/// constant.
 const CHOOSY: [&str; 4] = ["compensate", "harmonics", "identify", "diagnose"];
 
-/// What a verb says of what it took, by the names of the facts.
+/// Facts that a command reports about its input, by name.
 type Taken = BTreeMap<&'static str, String>;
 
 #[test]
@@ -117,7 +118,7 @@ fn every_verb_takes_the_same_from_a_recording() {
     );
 }
 
-/// The facts of a sample that verbs do not agree on, with the verbs that say each.
+/// The facts of a sample on which commands disagree, with the commands for each value.
 fn differences(name: &str) -> String {
     let taken = every_verb(name);
     let mut text = String::new();
@@ -147,7 +148,7 @@ fn differences(name: &str) -> String {
     format!("{name}\n{text}")
 }
 
-/// What every verb takes as the first channel of a sample.
+/// What every command reads as the first channel of a sample.
 fn every_verb(name: &str) -> Vec<(&'static str, Taken)> {
     let file = name.strip_prefix("recordings/").unwrap_or_default();
     let options = options(file);
@@ -224,7 +225,7 @@ fn every_verb(name: &str) -> Vec<(&'static str, Taken)> {
     taken
 }
 
-/// Number of a channel that was recorded with the first one, and has a number everywhere.
+/// Number of a channel that was recorded together with the first one and is numeric throughout.
 fn second_channel(report: &Value) -> Option<String> {
     let channels = report["channels"].as_array()?;
     let first = channels.first()?;
@@ -274,7 +275,7 @@ fn inspect(ran: &Ran, report: &Value, name: &str) -> Taken {
     taken
 }
 
-/// Of a table of time and value.
+/// From a table of time and value.
 fn extract(ran: &Ran) -> Taken {
     let mut taken = Taken::new();
     taken.insert("refused", refused(ran));
@@ -321,7 +322,7 @@ fn extract(ran: &Ran) -> Taken {
     taken
 }
 
-/// Of a verb that reports what it took as JSON; with a unit that the stand understands, if it asks for one.
+/// From a command that reports its input as JSON; with a unit that the stand accepts, if it asks for one.
 fn reported(of: &str, args: &[&str], options: &[String]) -> Taken {
     let mut ran = verb(of, args, options);
     let mut taken = Taken::new();
@@ -381,12 +382,12 @@ fn numbers(taken: &mut Taken, report: &Value) {
         taken.insert("samples", samples.to_string());
     }
     if let Some(rate) = report.get("rate_hz") {
-        // Rates that follow from the same stamps in two ways differ by rounding.
+        // Rates derived from the same stamps in two ways differ by rounding.
         taken.insert("rate", rate.as_f64().map_or("null".to_owned(), rounded));
     }
 }
 
-/// A rate to the digits that `extract` says.
+/// A rate to the digits printed by `extract`.
 fn rounded(hz: f64) -> String {
     format!("{hz:.4e}")
 }
@@ -399,7 +400,7 @@ fn said(ran: &Ran) -> impl Iterator<Item = &str> {
         .map(|(code, _)| code)
 }
 
-/// The codes that are about reading, sorted.
+/// The codes about reading, sorted.
 fn reading<'a>(codes: impl Iterator<Item = &'a str>) -> String {
     let mut codes: Vec<&str> = codes
         .filter(|code| READING.iter().any(|begin| code.starts_with(begin)))
@@ -409,7 +410,7 @@ fn reading<'a>(codes: impl Iterator<Item = &'a str>) -> String {
     format!("[{}]", codes.join(" "))
 }
 
-/// Why a verb refuses to read a recording.
+/// Why a command rejects a recording.
 fn refused(ran: &Ran) -> String {
     let says = |part: &&str| ran.stderr.contains(*part);
     if matches!(ran.code, 0 | 3) {
@@ -419,8 +420,8 @@ fn refused(ran: &Ran) -> String {
     reason.map_or("yes", |(reason, _)| reason).to_owned()
 }
 
-/// Whether verbs differ in what they refuse. `inspect` takes any recording, and `extract` and `identify decay` need no
-/// uniform steps.
+/// Whether commands differ in what they reject. `inspect` accepts any recording, and `extract` and `identify decay`
+/// need no uniform steps.
 fn refuse_differently(taken: &[(&'static str, Taken)]) -> bool {
     let mut reasons: Vec<&str> = taken
         .iter()

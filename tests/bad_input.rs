@@ -1,4 +1,4 @@
-//! Bad input gets an error that names the place and the remedy, and leaves nothing behind.
+//! Bad input causes an error that names the place and the remedy, and leaves no files behind.
 
 use crate::util::{COMPENSATE, Folder, HARMONICS, Ran, record, steady};
 
@@ -7,7 +7,7 @@ fn good() -> String {
     record(&steady(&[(1.0, 60.0, 0.0)], 20_000.0, 3000).0, 20_000.0)
 }
 
-/// Compensates `in.csv` with extra arguments; nothing but the inputs may be left.
+/// Compensates `in.csv` with extra arguments; only the inputs may remain.
 fn refused(content: &[u8], more: &[&str], code: i32, parts: &[&str]) -> Ran {
     let folder = Folder::new();
     folder.write("in.csv", content);
@@ -218,7 +218,7 @@ fn missing_samples_are_not_skipped_without_stamps() {
     let args = ["--rate", "1000", "--channel", "2", "--unit", "V"];
     refused(&rows(","), &args, 1, &["line 70001", "empty"]);
     refused(&rows(""), &args, 1, &["line 70001", "empty"]);
-    // A remark is no lost sample, nor is an empty line at the end.
+    // Neither a remark nor an empty line at the end is a lost sample.
     let folder = Folder::new();
     folder.write("in.csv", [rows("# pause"), b"\n\n".to_vec()].concat());
     let ran = folder.run(
@@ -291,7 +291,7 @@ fn time() {
     );
     refused(&step(2000, -5e-5), &[], 1, &["line 2002", "repeats"]);
     refused(&step(5, 1e-4), &[], 1, &["line 7", "not uniform"]);
-    // 2 % of a step is refused, half a per cent is not.
+    // 2 % of a step is rejected, half a per cent is not.
     refused(&step(2000, 1e-6), &[], 1, &["line 2002", "1.02 times"]);
     let folder = Folder::new();
     folder.write("in.csv", step(2000, 2.5e-7));
@@ -301,7 +301,7 @@ fn time() {
 
 #[test]
 fn a_break_is_found_in_any_piece_of_a_long_file() {
-    // Far beyond the first piece, on any number of threads.
+    // Far beyond the first piece, with any number of threads.
     let mut text = "time_s,bridge_V\n".to_owned();
     for i in 0..200_000 {
         let t = f64::from(i) * 5e-5 + if i >= 150_000 { 1.0 } else { 0.0 };
@@ -443,7 +443,7 @@ fn a_record_cut_in_its_last_line_is_used_up_to_there() {
         ran.says(3, &["truncated-last-line", "line 3001", "left out"]);
         assert_eq!(folder.read("out.csv").lines().count(), 3000);
     }
-    // The same where the time is the last column and the cut goes through it.
+    // The same with the time as the last column and the cut within it.
     let swapped: String = (0..3000)
         .map(|i| format!("0.5,{:.5}\n", f64::from(i) * 5e-5))
         .collect();
@@ -463,7 +463,8 @@ fn a_record_cut_in_its_last_line_is_used_up_to_there() {
     folder
         .run(&args)
         .says(3, &["truncated-last-line", "line 3001"]);
-    // A last line that is whole but for its line feed is used, and suspect: its last number may be cut.
+    // A last line that only lacks its line feed is used with a warning: its last number may be
+    // truncated.
     folder.write("in.csv", whole.trim_end());
     let ran = folder.run(&[
         "compensate",

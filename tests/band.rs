@@ -1,4 +1,4 @@
-//! The band of `compensate`: chosen from the record and the stand, the same when asked again, or as given.
+//! The band of `compensate`: chosen from the record and the stand, reproducible, or as given.
 
 use crate::noise::Noise;
 use crate::util::{Folder, column, record, steady};
@@ -12,7 +12,7 @@ const PARTS: [(f64, f64, f64); 4] = [
     (0.3, 300.0, -1.0),
 ];
 
-/// A record with uniform noise of 0.01 N m rms, silent but for noise up to a sample.
+/// A record with uniform noise of 0.01 N m RMS, containing only noise up to a sample.
 fn noisy(count: usize, silent: usize) -> (String, Vec<f64>) {
     let (shown, acted) = steady(&PARTS, RATE, count);
     let mut noise = Noise(11);
@@ -55,7 +55,7 @@ fn the_band_follows_the_torque_and_is_the_same_when_asked_again() {
     let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
     let band = &report["band"];
     let top_hz = band["top_hz"].as_f64().unwrap();
-    // The last line is at 300 Hz, and the inverse multiplies noise only from 830 Hz (590 √2) on.
+    // The last line is at 300 Hz, and the inverse amplifies noise only above 830 Hz (590 √2).
     assert!((290.0..900.0).contains(&top_hz), "{band}");
     assert_eq!(band["chosen_from"], "record");
     assert_eq!(band["seconds"], 2.0);
@@ -69,7 +69,7 @@ fn the_band_follows_the_torque_and_is_the_same_when_asked_again() {
     assert!(!ran.stderr.contains("warning"), "{}", ran.stderr);
     let chosen = folder.read("out.csv");
 
-    // The same band as an option, from a pipe and as a whole gives the same samples.
+    // The same band as an option, from a pipe and as a whole, gives the same samples.
     let given = top_hz.to_string();
     let again = folder.run(&[
         "compensate",
@@ -80,7 +80,7 @@ fn the_band_follows_the_torque_and_is_the_same_when_asked_again() {
         "--band",
         &given,
     ]);
-    // Blocks that were read ahead are cut elsewhere: equal to rounding.
+    // Blocks read ahead have other boundaries: equal within rounding.
     let torque = |text: &str| column(text, "compensated_torque_n_m");
     for (a, b) in torque(&again.stdout).iter().zip(torque(&chosen)) {
         assert!((a - b).abs() < 1e-9, "{a} {b}");
@@ -94,7 +94,7 @@ fn the_band_follows_the_torque_and_is_the_same_when_asked_again() {
     let whole = folder.json(&[&args[..], &["--whole-record"]].concat());
     assert_eq!(whole["band"]["top_hz"], band["top_hz"]);
 
-    // The band of the thesis lets in noise, multiplied by up to 15, and says so.
+    // The band of the thesis admits noise amplified by up to 15, and a warning says so.
     let rated = folder.run(&[
         "compensate",
         "in.csv",
@@ -133,7 +133,7 @@ fn a_record_without_signal_takes_the_band_of_the_stand() {
 #[test]
 fn a_quiet_start_of_a_long_record_is_said() {
     let folder = Folder::new();
-    // 131,072 samples and a little more are looked at.
+    // 131,072 samples and slightly more are examined.
     let (text, _) = noisy(300_000, 200_000);
     let ran = folder.pipe(
         &["compensate", "-", "--stand", "stand.toml", "-o", "out.csv"],

@@ -1,4 +1,4 @@
-//! Many recordings through the verbs that read one.
+//! Batch runs of the commands that read one recording.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -44,14 +44,14 @@ fn folder() -> Folder {
     folder
 }
 
-/// Writes a file and the folders that it is in.
+/// Writes a file, creating its folders.
 pub fn put(folder: &Folder, name: &str, content: impl AsRef<[u8]>) {
     let path = folder.path(name);
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();
     std::fs::write(path, content).unwrap();
 }
 
-/// All files below a folder with their bytes, by their paths; none if the folder is not there.
+/// All files below a folder with their bytes, by path; empty if the folder does not exist.
 fn files(root: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![root.to_owned()];
@@ -62,7 +62,7 @@ fn files(root: &Path) -> BTreeMap<String, Vec<u8>> {
                 true => folders.push(path),
                 false => {
                     let name = path.strip_prefix(root).unwrap().to_str().unwrap();
-                    // A temporary file may be gone by now.
+                    // A temporary file may have been removed meanwhile.
                     if let Ok(bytes) = std::fs::read(&path) {
                         found.insert(name.to_owned(), bytes);
                     }
@@ -145,7 +145,7 @@ fn the_number_of_workers_changes_nothing() {
 #[test]
 fn the_manifest_names_content_by_its_sha_256() {
     let folder = folder();
-    // FIPS 180-2 does not know these files: the system's own program does.
+    // FIPS 180-2 has no sums of these files: the system's own program does.
     assert_eq!(folder.run(&with(&MANY, &["--band", "800"])).code, 0);
     for line in manifest(&folder) {
         let input = line["input"].as_str().unwrap();
@@ -246,7 +246,7 @@ fn failures_end_the_run_where_asked() {
     fast.says(1, &["1 of 6 recordings failed, 5 were not begun"]);
     let two = folder.run(&with(&MANY, &["--jobs", "1", "--max-failures", "2"]));
     two.says(1, &["2 of 6 recordings failed, 4 were not begun"]);
-    // The report says which failed: a document of the failure beside it could not be parsed.
+    // The report says which failed: an additional JSON failure would make the output unparsable.
     let report = folder.run(&with(&MANY, &["--jobs", "1", "--fail-fast", "--json"]));
     let report: Value = serde_json::from_str(&report.stdout).expect("one JSON document");
     assert_eq!(report["schema"], "torqcomp.batch/1");
@@ -258,7 +258,7 @@ fn failures_end_the_run_where_asked() {
     none.says(1, &["2 of 2 recordings failed\n"]);
 }
 
-/// How many recordings a run with `--skip-existing` made and skipped.
+/// Number of recordings that a run with `--skip-existing` made and skipped.
 fn made_and_skipped(folder: &Folder, args: &[&str]) -> (u64, u64) {
     let ran = folder.run(&with(args, &["--skip-existing", "--json"]));
     assert_eq!(ran.code, 0, "{}", ran.stderr);
@@ -273,7 +273,7 @@ fn results_are_skipped_only_if_they_were_made_from_the_same() {
     let folder = folder();
     assert_eq!(made_and_skipped(&folder, &MANY), (4, 0));
     assert_eq!(made_and_skipped(&folder, &MANY), (0, 4));
-    // What was touched is of the same content.
+    // A touched file has the same content.
     folder.write("stand.toml", HERTEL);
     folder.write(LOGS[0], log(0));
     assert_eq!(made_and_skipped(&folder, &MANY), (0, 4));
@@ -287,7 +287,7 @@ fn results_are_skipped_only_if_they_were_made_from_the_same() {
     assert_eq!(made_and_skipped(&folder, &MANY), (4, 0));
     let band = with(&MANY, &["--band", "800"]);
     assert_eq!(made_and_skipped(&folder, &band), (4, 0));
-    // Spelled in another way, and with other workers.
+    // Options spelled differently, and other numbers of workers.
     let same = with(&MANY, &["--band=800", "--jobs", "1", "--threads", "1"]);
     assert_eq!(made_and_skipped(&folder, &same), (0, 4));
     let found = results(&folder);
@@ -314,7 +314,7 @@ fn files_that_no_manifest_knows_are_kept() {
     }
     assert_eq!(folder.run(&with(&MANY, &["--force"])).code, 0);
     assert_eq!(folder.read("out/a.torque.csv").lines().count(), 6_001);
-    // Another tree with the same names is another one.
+    // Another tree with the same names.
     put(&folder, "other/a.csv", log(5));
     let other = [
         "compensate",
@@ -354,13 +354,13 @@ fn a_killed_run_goes_on_where_it_was() {
     let before = lines();
     let before = before - 1;
     assert!((5..30).contains(&before), "{before} lines");
-    // As if the kill had come within a line.
+    // As if killed in the middle of a line.
     let mut cut = std::fs::read(folder.path("out/torqcomp-manifest.jsonl")).unwrap();
     cut.extend_from_slice(b"{\"schema\":\"torqcomp.manifest/1\",\"vers");
     folder.write("out/torqcomp-manifest.jsonl", cut);
     let (made, skipped) = made_and_skipped(&folder, &MANY);
     assert_eq!(made + skipped, 30);
-    // Each worker had at most one line on the disk whose result had no name yet.
+    // Each worker had at most one synced line whose result was not yet renamed.
     assert!(skipped as usize >= before - 2, "{skipped} of {before}");
     let found = results(&folder);
     assert_eq!(found.len(), 30, "{:?}", found.keys());
@@ -449,7 +449,7 @@ fn patterns_are_expanded_without_a_shell() {
             "tue/deep/d.torque.csv"
         ]
     );
-    // A file of that name is itself.
+    // A file with that literal name takes precedence.
     assert_eq!(run("logs/star*.csv"), ["star*.torque.csv"]);
     let none = [
         "compensate",
@@ -529,7 +529,8 @@ fn results_never_take_the_place_of_each_other_or_of_a_recording() {
         .run(&over)
         .says(2, &["would take the place of the recording"]);
     assert_eq!(folder.read("logs/a.csv"), log(0));
-    // Results beside the recordings are no recordings of the next run, nor are stand file and summary.
+    // Results next to the recordings are not recordings for the next run, nor are stand file and
+    // summary.
     folder.write("logs/stand.toml", HERTEL);
     let beside = [
         "compensate",
@@ -621,7 +622,7 @@ fn every_verb_that_reads_one_record_takes_many() {
     assert_eq!(both["files"].as_array().unwrap().len(), 2);
 }
 
-/// Whatever call of a run fails, each result that is there is explained by the manifest.
+/// Whichever call of a run fails, each existing result has a line in the manifest.
 #[cfg(debug_assertions)]
 #[test]
 fn a_manifest_that_cannot_be_written_leaves_no_result_unexplained() {

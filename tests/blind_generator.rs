@@ -1,4 +1,4 @@
-//! The blind records are what they say: their integrator against closed forms.
+//! Validation of the blind records: their integrator against closed-form solutions.
 
 use std::f64::consts::TAU;
 
@@ -112,7 +112,7 @@ fn variant(effect: &str, name: &str) -> &'static catalogue::Variant {
         .expect("the catalogue has it")
 }
 
-/// Effects of these sizes in one stand: what is recorded of a multisine.
+/// Record of a multisine with effects of these sizes in one stand.
 fn together(effects: &[(&str, &str, f64)], input: &Input) -> (Built, Vec<f64>) {
     let variants: Vec<_> = effects
         .iter()
@@ -168,7 +168,7 @@ fn torques_together_add_up() {
 fn dry_friction_holds_and_then_takes_its_part() {
     let built = friction::coulomb(&scene(), 0.5, &mut Draw::new(0, ""));
     // 1 N m of friction: a slow sine of 0.99 N m moves nothing, one of 3 N m shows 2 N m at most and
-    // keeps that while the torque falls by 2 N m.
+    // holds that while the torque falls by 2 N m.
     let still = run(built.dynamics.as_ref(), &sines(&[(0.99, 2.5, 0.0)]).input()).samples();
     assert!(still.iter().all(|shown| *shown == 0.0));
     let moved = run(built.dynamics.as_ref(), &sines(&[(3.0, 2.5, 0.0)]).input()).samples();
@@ -185,7 +185,7 @@ fn every_effect_is_neutral_when_small_and_not_when_large() {
     let excitation = Excitation::multisine(&mut Draw::new(3, "excitation"), 2.0, false);
     let input = excitation.input();
     let plain = run(&Plain(Constants::hertel()), &input);
-    // One of each kind of equation: all variants would take a minute.
+    // One of each kind of equation, as all variants would take a minute.
     let some = ["coupled", "cubic", "hardening", "gap", "exponent 1"];
     for variant in catalogue::CATALOGUE
         .iter()

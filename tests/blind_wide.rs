@@ -1,4 +1,5 @@
-//! Blind records of stands far from the thesis': their inputs, filter and noise against closed forms.
+//! Blind records of stands far from the thesis': their inputs, filter and noise against closed-form
+//! solutions.
 
 use std::f64::consts::{PI, SQRT_2, TAU};
 
@@ -21,7 +22,7 @@ const WIDE: Asked = Asked {
     strength: None,
 };
 
-/// A stand of 500 Hz with little damping.
+/// A lightly damped stand of 500 Hz.
 fn stand() -> Constants {
     let (omega, ratio, stiffness_n_m) = (TAU * 500.0, 0.01, 1e5);
     Constants {
@@ -38,7 +39,7 @@ fn span(samples: usize) -> Span {
     }
 }
 
-/// What the integrator and the plain fit's make of an input.
+/// Responses of the integrator and of the plain fit's model to an input.
 fn answers(input: &Input) -> [Vec<f64>; 2] {
     let plain = PlainConstants {
         omega: stand().omega(),
@@ -53,14 +54,14 @@ fn largest_difference(signal: &[f64], closed_form: impl Fn(f64) -> f64) -> f64 {
     signal.iter().enumerate().map(at).fold(0.0, f64::max)
 }
 
-/// What is shown a time after a unit of torque times time.
+/// Response to a unit ramp of torque, after a time.
 fn impulse(time_s: f64) -> f64 {
     let (omega, ratio) = (stand().omega(), stand().damping_ratio());
     let swing = omega * (1.0 - ratio * ratio).sqrt();
     omega * omega / swing * (-ratio * omega * time_s).exp() * (swing * time_s).sin()
 }
 
-/// What is shown a time after a step of 1.
+/// Response to a unit step, after a time.
 fn step(time_s: f64) -> f64 {
     if time_s <= 0.0 {
         return 0.0;
@@ -109,7 +110,7 @@ fn a_hit_leaves_the_free_decay_of_its_impulses() {
                 false => decay(t),
             });
             assert!(peak > 1.0 && off < bound, "smooth {smooth}: {off:e}");
-            // The record itself is still before the hit.
+            // The record itself is still zero before the hit.
             assert!(signal[..node / FINER].iter().all(|shown| *shown == 0.0));
         }
     }
@@ -199,7 +200,7 @@ fn the_filter_is_on_both_channels_as_its_response_says() {
         let measured = filter.signal(dense.clone()).samples();
         let off = largest_difference(&measured, |t| steady(t, &plain));
         assert!(off < 1e-5, "measured, order {}: {off:e}", filter.order);
-        // The plain fit is to the recorded torque: its answer is what the filter makes of the stand's.
+        // The plain fit uses the recorded torque: its response is the filtered response of the stand.
         let fitted = &answers(&recorded)[1];
         let off = largest_difference(&measured, |t| fitted[(t * RATE_HZ).round() as usize]);
         assert!(off < 1e-3, "fit, order {}: {off:e}", filter.order);
@@ -256,7 +257,7 @@ fn random_torque_has_its_rms_and_no_period() {
         let off = off.fold(0.0, f64::max) / largest;
         assert!(off < 1e-6, "derivative {derivative}: {off:e}");
     }
-    // Nothing of it comes back within the record.
+    // Nothing wraps around into the record.
     let half = points / 2;
     for lag in (500..half).step_by(500) {
         let moved = (0..half).map(|k| values[k] * values[k + lag]).sum::<f64>() / half as f64;
@@ -268,7 +269,7 @@ fn random_torque_has_its_rms_and_no_period() {
 fn noise_on_the_applied_torque_rings_in_the_stand() {
     let mut draw = Draw::new(1, "noise");
     let noise: Vec<f64> = (0..32_000).map(|_| 0.1 * draw.normal()).collect();
-    // White up to half the rate, through a resonance of bandwidth π f/(4 ζ) at the gain of 1.
+    // White up to the Nyquist frequency, through a resonance of bandwidth π f/(4 ζ) at a gain of 1.
     let natural_hz = stand().omega() / TAU;
     let bandwidth_hz = PI * natural_hz / (4.0 * stand().damping_ratio());
     let expected = 0.1 * (bandwidth_hz / (RATE_HZ / 2.0)).sqrt();

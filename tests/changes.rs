@@ -1,4 +1,4 @@
-//! A stand that changes within a record: `diagnose` says when and what, and names no effect.
+//! A stand that changes within a record: `diagnose` reports when and what, and names no effect.
 
 use serde_json::Value;
 
@@ -8,7 +8,7 @@ use crate::util::Folder;
 
 const MOMENT_S: f64 = 2.9;
 
-/// The diagnosis of a record with a torque, another part of the same record being held out.
+/// Diagnosis of a record with a torque, with another part of the same record held out.
 fn diagnosed(law: impl Fn(f64, f64, f64) -> f64) -> (Value, f64) {
     let (train, noise_rms) = record(law, (0.12, 50.0), &mut Noise(11));
     let folder = Folder::new();
@@ -62,7 +62,7 @@ fn a_joint_that_comes_loose() {
     );
 }
 
-/// Damping that grows evenly, and a wavy spring: no moment is named.
+/// Linearly growing damping, and a wavy spring: no moment is named.
 #[test]
 fn what_does_not_happen_at_a_moment() {
     let length_s = SAMPLES as f64 / RATE_HZ;

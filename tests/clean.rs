@@ -1,5 +1,5 @@
-//! Stands that lack nothing, integrated here and recorded in ways that have been taken for effects: noise that is not
-//! white, and few periods of a stand that rings longer than its record.
+//! Perfect stands, integrated here and recorded in ways that have been mistaken for effects: coloured noise, and few
+//! periods of a stand that rings longer than its record.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,12 +11,12 @@ use crate::util::Folder;
 
 const NATURAL_HZ: f64 = 20.0;
 
-/// What is applied.
+/// The applied torque.
 #[derive(Clone, Copy)]
 enum Input {
     /// Thirty sines.
     Sines,
-    /// Levels that are held for three periods of the stand each.
+    /// Levels held for three periods of the stand each.
     Plateaus,
     /// Smooth pulses half a period long, ten periods apart.
     Hits,
@@ -25,21 +25,21 @@ enum Input {
 /// A stand and the way it is recorded.
 #[derive(Clone, Copy)]
 struct Setting {
-    /// What is applied in the training record and in the held-out one.
+    /// Input of the training record and of the held-out one.
     inputs: [Input; 2],
     damping_ratio: f64,
     /// Length of the record in periods of the stand.
     periods: usize,
-    /// Samples in a period.
+    /// Samples per period.
     samples: usize,
-    /// Noise over the rms of the record, and its correlation from one sample to the next.
+    /// Noise relative to the RMS of the record, and its correlation between samples.
     noise: f64,
     memory: f64,
-    /// White noise on the applied torque over its rms.
+    /// White noise on the applied torque relative to its RMS.
     applied: f64,
 }
 
-/// Applied and recorded torque from rest: Runge and Kutta's method in steps of 1/400 period.
+/// Applied and recorded torque from rest, by the Runge–Kutta method in steps of 1/400 period.
 fn record(setting: &Setting, input: Input, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
     let lines: Vec<[f64; 2]> = (0..30)
         .map(|k| {
@@ -67,7 +67,7 @@ fn record(setting: &Setting, input: Input, noise: &mut Noise) -> (Vec<f64>, Vec<
     let (mut state, mut applied, mut shown) = ([0.0, 0.0], Vec::new(), Vec::new());
     for i in 0..setting.periods * setting.samples * steps {
         let t = i as f64 * step;
-        // Within the step, on whose ends a level may change.
+        // Just within the step, as a level may change at its ends.
         let [now, half, next] = [1e-6, 0.5, 1.0 - 1e-6].map(|part| torque(t + part * step));
         if i % steps == 0 {
             applied.push(now);
@@ -96,7 +96,7 @@ fn record(setting: &Setting, input: Input, noise: &mut Noise) -> (Vec<f64>, Vec<
     (applied, shown)
 }
 
-/// The diagnosis of two records, by a stand file whose frequency is 5 % off.
+/// Diagnosis of two records with a stand file whose frequency is 5 % off.
 fn diagnosed(setting: &Setting, seed: u64) -> Value {
     let folder = Folder::new();
     let (natural_hz, damping_ratio) = (1.05 * NATURAL_HZ, 1.1 * setting.damping_ratio);
@@ -119,7 +119,7 @@ fn diagnosed(setting: &Setting, seed: u64) -> Value {
     folder.json(&[&args[..], &records, &channels].concat())
 }
 
-/// Of eight stands that lack nothing, how many are said to, and the effects that are named.
+/// Number of eight perfect stands reported as deficient, and the effects named.
 fn answers(setting: &Setting) -> (usize, Vec<String>) {
     let (mut right, mut named) = (0, Vec::new());
     for seed in 1..=8 {
@@ -140,7 +140,7 @@ fn answers(setting: &Setting) -> (usize, Vec<String>) {
     (right, named)
 }
 
-/// The noise floor is that of white noise: noise of first order is four times that.
+/// The noise floor assumes white noise: first-order noise is four times that.
 #[test]
 fn noise_that_is_not_white_is_no_missing_effect() {
     let setting = Setting {
@@ -156,8 +156,8 @@ fn noise_that_is_not_white_is_no_missing_effect() {
     assert!(right >= 7 && named.is_empty(), "{right} of 8, {named:?}");
 }
 
-/// Over 20 periods this stand's free motion loses no more than a third. With the frequency of the stand file, which is 5 % off, it
-/// would be another one.
+/// Over 20 periods this stand's free motion loses no more than a third. With the frequency of the stand file, which is
+/// 5 % off, it would be a different motion.
 #[test]
 fn a_stand_that_rings_longer_than_its_record_is_fitted() {
     let setting = Setting {
@@ -173,7 +173,7 @@ fn a_stand_that_rings_longer_than_its_record_is_fitted() {
     assert!(right >= 7 && named.is_empty(), "{right} of 8, {named:?}");
 }
 
-/// The model answers noise on the recorded torque and rings with it, the stand does not.
+/// The model responds to noise on the recorded torque by ringing, the stand does not.
 #[test]
 fn noise_on_the_applied_torque_is_no_missing_effect() {
     let setting = Setting {
@@ -189,7 +189,7 @@ fn noise_on_the_applied_torque_is_no_missing_effect() {
     assert!(right >= 7 && named.is_empty(), "{right} of 8, {named:?}");
 }
 
-/// Each input has its own course between its samples: levels are held, sines are not.
+/// Each input has its own waveform between samples: levels are held, sines are not.
 #[test]
 fn one_input_of_levels_and_one_of_sines() {
     for inputs in [
@@ -210,7 +210,7 @@ fn one_input_of_levels_and_one_of_sines() {
     }
 }
 
-/// A gap or friction takes noise on the applied torque out of a model where that is quiet between hits.
+/// A gap or friction would remove the response of a model to noise on the applied torque between hits.
 #[test]
 fn noise_on_the_torque_of_hits_is_no_gap() {
     let setting = Setting {

@@ -1,4 +1,4 @@
-//! `compensate` gives back the torque that acted.
+//! `compensate` recovers the applied torque.
 
 use crate::noise::Noise;
 use crate::util::{COMPENSATE, Folder, column, hertel_response, record, sampled, steady, table};
@@ -105,7 +105,7 @@ fn units_and_headings() {
             "recorded_torque_ft_lbf"
         ]
     );
-    // A constant keeps the static gain, to the first and last sample: 1 ft lbf.
+    // A constant is scaled by the static gain, up to the first and last sample: 1 ft lbf.
     for row in table(&us).1 {
         assert!(
             (row[1] - 1.0).abs() < 1e-10 && (row[2] - 1.0).abs() < 1e-10,
@@ -238,7 +238,7 @@ fn recorder_low_pass_and_delay_are_divided_out() {
         .collect();
     folder.write("in.csv", record(&shown, rate));
     let ran = folder.run(&["compensate", "in.csv", "--stand", "stand.toml", "-q"]);
-    // The stand file does not say that the low-pass is of first order.
+    // The stand file does not give the order of the low-pass.
     ran.says(0, &["[low-pass-order-assumed]"]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     let torque = column(&ran.stdout, "compensated_torque_n_m");
@@ -273,7 +273,7 @@ fn the_zero_of_the_recorder_counts_on_every_way_to_torque() {
 
 #[test]
 fn clock_stamps_keep_their_resolution() {
-    // Milliseconds since 1970, where a copy of the text will not do.
+    // Milliseconds since 1970, whose text cannot be copied.
     let folder = Folder::new();
     let stamp = |i: u32| 1.7e12 + 0.5 * f64::from(i);
     let rows: String = (0..2000)
@@ -329,7 +329,7 @@ fn a_signal_above_the_band_and_an_unknown_noise_are_said() {
         "300",
     ]);
     ran.says(0, &["signal-above-band", "300 Hz"]);
-    // The edge of this band reaches to 630 Hz, and takes nearly all of the second line.
+    // The edge of this band extends to 630 Hz, and removes nearly all of the second line.
     let edge = [
         "compensate",
         "in.csv",
@@ -403,7 +403,7 @@ fn resampling_says_what_it_did() {
     assert_eq!(torque.len(), 20_000);
     assert!(largest_difference(&torque[500..8500], &acted[500..8500]) < 1e-4);
     assert_eq!(report["resampled"]["repeated"], 0);
-    // Both ways to run it resample alike.
+    // Both implementations resample alike.
     let whole = [&args[..5], &["-o", "whole.csv", "--whole-record"]].concat();
     assert_eq!(folder.run(&whole).code, 0);
     let whole = column(&folder.read("whole.csv"), "compensated_torque_n_m");
@@ -433,12 +433,12 @@ fn the_example_gives_back_the_torque_that_went_in() {
     let truth = column(truth.split_once('\n').unwrap().1, "torque_ft_lbf");
     let error: Vec<f64> = torque.iter().zip(&truth).map(|(a, b)| a - b).collect();
     let rms = (error[400..5600].iter().map(|e| e * e).sum::<f64>() / 5200.0).sqrt();
-    // What is left is the recorder's noise and the torque above the band, as large as the report says.
+    // The remainder is the recorder's noise and the torque above the band, as large as reported.
     let stated = report["noise"]["record"]["compensated_rms"]
         .as_f64()
         .unwrap();
     assert!((rms / stated - 1.0).abs() < 0.15, "{rms} stated {stated}");
-    // As recorded, the stand's ringing is forty times that.
+    // In the record itself, the stand's ringing is forty times that.
     let recorded = folder.run(&[
         "compensate",
         &path("record.csv"),

@@ -1,7 +1,7 @@
-//! `diagnose` of free ringing alone: no torque is measured, only the gage.
+//! `diagnose` of free decays only: no torque is measured, only the gage.
 //!
-//! The records are integrated here by Runge and Kutta's method (dry friction: as much of the speed as it can take in each of
-//! 40 steps from sample to sample).
+//! The records are integrated here by the Runge–Kutta method (dry friction: up to the whole speed, in each of 40 steps
+//! per sample).
 
 use std::f64::consts::{PI, TAU};
 
@@ -17,7 +17,7 @@ const STEPS: usize = 40;
 /// Noise and zero of the gage, in V.
 pub const NOISE: f64 = 1e-3;
 const ZERO: f64 = 0.05;
-/// Beginning and length of a hit, in s.
+/// Start and duration of a hit, in s.
 const HIT_S: [f64; 2] = [0.1, 0.003];
 
 /// `x'' + 2 ζ ω x' + ω² (x + c x³ + F sgn x' + d x' |x'|) = ω² u`, `x` in V.
@@ -38,11 +38,11 @@ pub const PLAIN: Stand = Stand {
 };
 
 impl Stand {
-    /// A record of the gage after a hit that swings it to about so many volts.
+    /// A record of the gage after a hit with an amplitude of about `volts`.
     pub fn hit(&self, volts: f64, seed: u64) -> String {
         let omega = TAU * self.natural_hz;
         let h = 1.0 / (RATE_HZ * STEPS as f64);
-        // The pulse takes the stand to the speed ω times the swing.
+        // The pulse gives the stand the speed ω times the amplitude.
         let top = volts * omega * PI / (2.0 * HIT_S[1]);
         let push = |t: f64| {
             let part = (t - HIT_S[0]) / HIT_S[1];
@@ -80,7 +80,7 @@ impl Stand {
         text
     }
 
-    /// The diagnosis of two hits, the second held out.
+    /// Diagnosis of two hits, the second held out.
     fn diagnosed(&self, more: &[&str]) -> (Folder, Value) {
         let folder = Folder::new();
         folder.write("first.csv", self.hit(1.0, 1));
@@ -150,7 +150,7 @@ fn a_stiffness_that_grows_is_found_and_simulated_in_the_stand_file() {
         "{value} ± {std}"
     );
     assert!(folder.read("page.html").contains("second.csv"));
-    // The stand file needs the gain, and is read again: beside its effect nothing is missing.
+    // The stand file needs the gain, and is read again: with its effect nothing is missing.
     let mechanics = "natural_frequency = \"21 Hz\"\ndamping_ratio = 0.02\nstatic_gain = \"2 V/N\"";
     let file = format!("schema = \"torqcomp.stand/1\"\n[mechanics]\n{mechanics}\n");
     folder.write("stand.toml", file);
@@ -172,7 +172,7 @@ fn a_stiffness_that_grows_is_found_and_simulated_in_the_stand_file() {
     assert_eq!(again["verdict"], "nothing-missing");
 }
 
-/// Over a long decay, the curved stiffness adds a turn to the ringing that no plain stand has.
+/// Over a long decay, the nonlinear stiffness adds a turn that no plain stand has.
 #[test]
 fn a_stiffness_that_grows_is_found_with_little_damping() {
     let stand = Stand {
@@ -187,7 +187,7 @@ fn a_stiffness_that_grows_is_found_with_little_damping() {
     assert!((value - 0.05).abs() < 4.0 * std, "{value} ± {std}");
 }
 
-/// A little of it, and so much that the ringing ends after a few turns.
+/// A little friction, and so much that the decay ends after a few turns.
 #[test]
 fn dry_friction_is_found() {
     for (natural_hz, damping_ratio, friction) in [
@@ -311,7 +311,7 @@ fn noise_is_no_decay_and_a_hand_on_the_stand_is_warned_of() {
     };
     folder.write("first.csv", PLAIN.hit(1.0, 1));
     folder.write("noise.csv", rows(&mut |_| ZERO + NOISE * noise.normal()));
-    // A hand stops the ringing after half a second.
+    // A hand stops the decay after half a second.
     let omega = TAU * PLAIN.natural_hz;
     let stopped = |i: usize, noise: &mut Noise| {
         let t = i as f64 / RATE_HZ;
@@ -338,7 +338,7 @@ fn noise_is_no_decay_and_a_hand_on_the_stand_is_warned_of() {
     quiet.says(1, &["same samples"]);
 }
 
-/// The scatter of the coefficient over records is what its standard uncertainty says.
+/// The scatter of the coefficient between records matches its standard uncertainty.
 #[test]
 fn uncertainties_of_a_curved_decay_hold() {
     let stand = Stand {
@@ -357,11 +357,11 @@ fn uncertainties_of_a_curved_decay_hold() {
     };
     let all: Vec<f64> = (10..22).map(off).collect();
     let rms = (all.iter().map(|z| z * z).sum::<f64>() / all.len() as f64).sqrt();
-    // Of twelve standardised numbers, the rms is within 0.52 and 1.54 in 99.9 % of all cases.
+    // For twelve standardised numbers, the RMS is within 0.52 and 1.54 in 99.9 % of all cases.
     assert!((0.5..1.55).contains(&rms), "{rms}: {all:?}");
 }
 
-/// A decay beside a record of plateaus changes nothing of the course of these.
+/// A decay together with a record of plateaus does not change their waveform.
 #[test]
 fn a_decay_stands_beside_plateaus() {
     let folder = Folder::new();

@@ -1,5 +1,6 @@
-//! Detection limits and uncertainties of `diagnose`, against records of a stand integrated here: an effect of the size of its limit is seen
-//! in nearly every record, one of a third of it in hardly any; and 95 % intervals include the truth in 95 % of all records.
+//! Detection limits and uncertainties of `diagnose`, against records of a stand integrated here: an effect at its limit
+//! is detected in nearly every record, one of a third of it in hardly any; and 95 % intervals cover the truth in 95 %
+//! of all records.
 
 use std::f64::consts::TAU;
 
@@ -12,24 +13,24 @@ const NATURAL_HZ: f64 = 60.0;
 const DAMPING_RATIO: f64 = 0.03;
 const RATE_HZ: f64 = 1000.0;
 const COUNT: usize = 6000;
-/// Standard deviation of the noise, over the rms of the motion.
+/// Standard deviation of the noise, relative to the RMS of the motion.
 const NOISE: f64 = 0.01;
 
-/// What is wrong with a stand.
+/// Fault of a stand.
 #[derive(Clone, Copy)]
 enum Fault {
-    /// `k x³` beside the spring, per (N m)².
+    /// `k x³` in addition to the spring, per (N m)².
     Cubic(f64),
     /// The record lags behind, in s.
     Delay(f64),
-    /// A line of 50 Hz, its amplitude in N m.
+    /// A 50 Hz line with its amplitude in N m.
     Mains(f64),
 }
 
-/// A fault of a size.
+/// A fault of a given size.
 type Made = fn(f64) -> Fault;
 
-/// Torque at a time: sines at frequencies without a common period, about 10 N m rms.
+/// Torque at a time: sines at incommensurate frequencies, about 10 N m RMS.
 fn torque(time_s: f64) -> f64 {
     let line = |k: u32| {
         let k = f64::from(k);
@@ -38,7 +39,8 @@ fn torque(time_s: f64) -> f64 {
     2.6 * (1..=30).map(line).sum::<f64>()
 }
 
-/// Torque and record of a stand with a fault, after one second of settling: Runge and Kutta's method in eight steps a sample.
+/// Torque and record of a stand with a fault, after one second of settling, by the Runge–Kutta method in eight steps
+/// per sample.
 fn record(fault: Fault, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
     let cubic = if let Fault::Cubic(k) = fault { k } else { 0.0 };
     let delay_s = if let Fault::Delay(s) = fault { s } else { 0.0 };
@@ -82,7 +84,7 @@ fn diagnosed(fault: Fault, seed: u64) -> Value {
     of_record(&applied, &shown)
 }
 
-/// The diagnosis of a record, its last 30 % held out.
+/// Diagnosis of a record with its last 30 % held out.
 fn of_record(applied: &[f64], shown: &[f64]) -> Value {
     let folder = Folder::new();
     folder.write(
@@ -112,9 +114,9 @@ fn limit(report: &Value, effect: &str) -> f64 {
 fn what_is_at_its_limit_is_seen_and_what_is_far_below_is_not() {
     let clean = diagnosed(Fault::Cubic(0.0), 1);
     assert_eq!(clean["verdict"], "nothing-missing", "{clean}");
-    // A line of amplitude A in n samples of noise s reduces the sum of squares by D = n A²/(2 s²) noise powers, give or take
-    // 2 √D. To be three times that with 95 % certainty, D - 1.645 · 2 √D = 3 · 2 √D: √D = 9.29. The first three time constants
-    // of the stand do not count, 0.265 s.
+    // A line of amplitude A in n samples of noise s reduces the sum of squares by D = n A²/(2 s²) noise powers, with a
+    // standard deviation of 2 √D. To be three times that with 95 % confidence, D - 1.645 · 2 √D = 3 · 2 √D: √D = 9.29.
+    // The first three time constants of the stand are excluded, 0.265 s.
     let samples = 0.7 * COUNT as f64 - 0.265 * RATE_HZ;
     let noise = clean["error"]["before"]["train_rms"].as_f64();
     let mains = limit(&clean, "mains-pickup");
@@ -145,8 +147,8 @@ fn what_is_at_its_limit_is_seen_and_what_is_far_below_is_not() {
     }
 }
 
-/// Noise on the applied torque goes through the model, and leaves a residual with a peak at the resonance: as white noise, half of
-/// the intervals of the damping ratio would miss the truth.
+/// Noise on the applied torque passes through the model, and leaves a residual with a peak at the resonance: treated as
+/// white noise, half of the intervals of the damping ratio would miss the truth.
 #[test]
 fn intervals_hold_with_noise_on_the_applied_torque() {
     let records = trials(12);

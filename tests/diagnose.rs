@@ -1,4 +1,5 @@
-//! `diagnose` and `simulate` through the binary, on blind records made by other code (see [`crate::blind`]).
+//! `diagnose` and `simulate` through the binary, on blind records made by independent code (see
+//! [`crate::blind`]).
 
 use std::f64::consts::TAU;
 
@@ -7,7 +8,7 @@ use crate::blind::setting::Asked;
 use crate::blind::write;
 use crate::util::{Folder, HERTEL, table};
 
-/// Samples of a record that are kept: enough for a diagnosis, few enough for a test.
+/// Number of samples kept of a record: enough for a diagnosis, few enough for a test.
 const KEPT: usize = 8000;
 const COLUMNS: [&str; 4] = ["--applied", "applied_n_m", "--measured", "measured_n_m"];
 
@@ -23,7 +24,7 @@ fn folder(case: &Case) -> Folder {
     folder
 }
 
-/// A diagnosis of both records in a folder.
+/// Diagnosis of both records in a folder.
 pub(crate) fn diagnose<'a>(more: &[&'a str]) -> Vec<&'a str> {
     let files = [
         "--stand",
@@ -45,7 +46,7 @@ fn strong(effect: &str, number: usize) -> Case {
     make_as(&asked, 301, effect, number).expect("the catalogue has it")
 }
 
-/// Rms of the noise that was added to the held-out record.
+/// RMS of the noise added to the held-out record.
 fn noise_rms(case: &Case) -> f64 {
     case.truth["noise"]["holdout_rms_n_m"]
         .as_f64()
@@ -69,7 +70,7 @@ fn an_effect_is_named_added_and_simulated() {
     assert!(rms("declared") > rms("before") && rms("before") > 3.0 * rms("after"));
     assert!(rms("after") < 1.2 * noise_rms(&case), "{}", rms("after"));
 
-    // The refined stand predicts the held-out record when it is run forwards.
+    // In a forward simulation, the refined stand predicts the held-out record.
     let simulated = folder.run(&[
         "simulate",
         "holdout.csv",
@@ -83,7 +84,7 @@ fn an_effect_is_named_added_and_simulated() {
     assert_eq!(simulated.code, 0, "{}", simulated.stderr);
     let (head, rows) = table(&folder.read("simulated.csv"));
     assert_eq!(head, ["time_s", "measured"]);
-    // The motion from before the record has decayed after 50 ms.
+    // The initial motion has decayed after 50 ms.
     let settled = 1000..KEPT - 40;
     let squares = settled
         .clone()
@@ -92,7 +93,7 @@ fn an_effect_is_named_added_and_simulated() {
     assert!(left < 1.2 * noise_rms(&case), "{left}");
     let page = folder.read("page.html");
     page_is_complete(&page);
-    // White noise of that rms at 20 kHz has the one-sided density rms²/10 kHz.
+    // White noise of that RMS at 20 kHz has the one-sided density RMS²/10 kHz.
     let (_, floor) = crate::reports::highest(&page, ">Spectrum<", 2);
     let rms = report["error"]["noise_floor_rms"].as_f64().expect("known");
     let difference = floor - (rms / 1e4_f64.sqrt()).log10();
@@ -159,7 +160,7 @@ fn threads_do_not_change_a_byte() {
     assert!(one.stdout.contains("\"gain-error\""));
 }
 
-/// The diagnosis of a case whose measured samples are changed by a function of the applied record, the row and the
+/// Diagnosis of a case whose measured samples are modified as a function of the applied record, the row and the
 /// sample.
 fn changed(case: &Case, change: impl Fn(&[f64], usize, f64) -> f64) -> serde_json::Value {
     let folder = folder(case);
@@ -214,7 +215,8 @@ fn a_slowly_or_rapidly_varying_gain_is_neither_noise_nor_an_effect() {
     is_unexplained(&report, "the magnitude of the signal");
 }
 
-/// An echo of the load after 10 samples, at 0.4 of the noise: the right effect is accepted, but not as a full explanation.
+/// An echo of the load after 10 samples, at 0.4 of the noise: the right effect is accepted, but not as a full
+/// explanation.
 #[test]
 fn an_effect_that_leaves_an_echo_explains_a_part() {
     let case = make(7, "cubic-stiffness", 1).expect("the catalogue has it");
@@ -230,7 +232,7 @@ fn an_effect_that_leaves_an_echo_explains_a_part() {
     assert_eq!(report["candidates"][0]["effect"], "cubic-stiffness");
 }
 
-/// A law that is not in the list is suspected, and no effect that resembles it is named.
+/// An unlisted law is suspected, and no effect that resembles it is named.
 #[test]
 fn laws_beside_the_list_are_suspected_and_not_added() {
     for (number, law) in [(0, "quintic-stiffness"), (1, "cubic-damping")] {
@@ -252,7 +254,8 @@ fn laws_beside_the_list_are_suspected_and_not_added() {
     }
 }
 
-/// Friction that falls with speed, friction at a place, a stop and creep are told from what resembles them.
+/// Friction that falls with speed, position-dependent friction, a stop and creep are distinguished from
+/// similar effects.
 #[test]
 fn effects_that_resemble_others_are_named() {
     for (effect, number) in [
@@ -272,7 +275,8 @@ fn effects_that_resemble_others_are_named() {
     }
 }
 
-/// A channel whose sign is wrong is no late one, though half a period late is nearly the same.
+/// A channel with the wrong sign is not a delayed one, though a delay of half a period is nearly
+/// the same.
 #[test]
 fn a_wrong_sign_is_refused_as_one() {
     let case = make(7, "none", 0).expect("the catalogue has it");
@@ -292,7 +296,7 @@ fn a_wrong_sign_is_refused_as_one() {
     run.says(1, &["of the opposite sign", "change the sign"]);
 }
 
-/// The square of such a sample is no number, nor is any error.
+/// The square of such a sample overflows, and with it every error.
 #[test]
 fn a_sample_beyond_all_instruments_is_refused() {
     let folder = folder(&make(7, "none", 1).expect("the catalogue has it"));
@@ -305,8 +309,8 @@ fn a_sample_beyond_all_instruments_is_refused() {
         .says(1, &["holdout.csv", "sample 1767", "-1e308"]);
 }
 
-/// What the training record shows and the held-out one does not, as it is of another stand without it, is not named, and the
-/// verdict is not that nothing is missing.
+/// An effect in the training record that the held-out one, of another stand, lacks is not named, and the verdict is not
+/// that nothing is missing.
 #[test]
 fn an_effect_that_the_held_out_record_lacks_is_not_named() {
     let case = make(7, "cubic-stiffness", 1).expect("the catalogue has it");
@@ -322,9 +326,9 @@ fn an_effect_that_the_held_out_record_lacks_is_not_named() {
     assert!(candidates.iter().all(|c| c["status"] == "rejected"));
 }
 
-/// Two effects of the generator in one stand are both found, and no third; the ladder of errors falls from step to step.
-/// Slow excitation of a lightly damped stand, recorded from the middle on: the motion at the start is not that of the plain
-/// stand whose stiffness makes up for the wrong scale.
+/// Two effects of the generator in one stand are both found, and no third; the ladder of errors falls from step to
+/// step. Slow excitation of a lightly damped stand, recorded from the middle on: the initial motion is not that of the
+/// plain stand whose stiffness compensates for the wrong scale.
 #[test]
 fn a_wrong_scale_in_the_middle_of_a_run_is_a_gain_error() {
     let (natural_hz, damping_ratio) = (60.0, 0.02);
@@ -422,7 +426,7 @@ fn two_effects_are_found_together() {
     assert_eq!(both.matches("[[effects]]").count(), 2);
 }
 
-/// A record in volts with a constant of 2 N m in it: the stand file says so after the first diagnosis, and after a second.
+/// A record in volts with an offset of 2 N m: included in the stand file after the first diagnosis, and after a second.
 #[test]
 fn a_declared_constant_is_taken_off_once() {
     let case = make(7, "none", 1).expect("the catalogue has it");
@@ -471,8 +475,8 @@ fn a_declared_constant_is_taken_off_once() {
     );
 }
 
-/// The same records on stands of another speed and size get the same answer: no constant of the search is in seconds, hertz or
-/// newton metres.
+/// The same records on stands of another speed and size give the same result: no constant of the search is in seconds,
+/// hertz or newton metres.
 #[test]
 fn answers_do_not_depend_on_the_scale_of_time_and_torque() {
     let case = make(7, "rotor-imbalance", 1).expect("the catalogue has it");

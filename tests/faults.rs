@@ -1,6 +1,6 @@
-//! Every call of a run that opens, creates, reads, writes, syncs, links or renames a file fails on purpose, one a run: what is
-//! left is the old files or the new ones, nothing else, with a message and exit code 1. A call that a signal interrupts or that
-//! moves one byte only changes nothing. After a kill, each file is old or new, and the next run removes what it left.
+//! Every call of a run that opens, creates, reads, writes, syncs, links or renames a file is made to fail, one per run:
+//! only the old files or the new ones remain, with a message and exit code 1. An interrupted call, or one that moves
+//! only one byte, changes nothing. After a kill, each file is old or new, and the next run removes the remainder.
 //!
 //! Short by default: the first and the last call of each kind. All of them:
 //!
@@ -16,7 +16,8 @@ use std::process::{Command, Output, Stdio};
 use crate::golden::{words, workplace};
 use crate::util::{Folder, HERTEL};
 
-/// Whatever writes, with what it may read and write at once: names that begin with `out` are its outputs.
+/// All commands that write, with as many inputs and outputs as possible; names that begin with `out` are
+/// outputs.
 const RUNS: [&str; 23] = [
     "compensate made/short.csv --channel bridge --stand stands/declared.toml -o out.csv --plot out.svg --html out.html --json",
     "compensate made/short.csv --channel bridge --stand stands/cubic.toml -o out.csv --no-sync",
@@ -42,9 +43,9 @@ const RUNS: [&str; 23] = [
     "schema table -o out.json",
     "merge logs/torqcomp-manifest.jsonl -o out.csv",
 ];
-/// Verbs that read no file.
+/// Commands that read no file.
 const WITHOUT_INPUT: [&str; 4] = ["init", "man", "completions", "schema"];
-/// What makes the manifest that is merged.
+/// Commands that make the manifest to be merged.
 const BEFORE_MERGE: [&str; 6] = [
     "extract",
     "made/short.csv",
@@ -54,7 +55,7 @@ const BEFORE_MERGE: [&str; 6] = [
     "logs/",
 ];
 
-/// What stood in an output before; `identify` updates a stand file.
+/// Previous content of an output; `identify` updates a stand file.
 fn old(name: &str) -> &'static [u8] {
     match name.ends_with(".toml") {
         true => HERTEL.as_bytes(),
@@ -66,7 +67,7 @@ const EIO: &str = "5";
 const ENOSPC: &str = "28";
 const EINTR: &str = "4";
 
-/// How a call of a kind may end.
+/// Possible failures of a kind of call.
 fn endings(call: &str) -> &'static [&'static str] {
     match call {
         "open" => &[EIO],
@@ -79,7 +80,7 @@ fn endings(call: &str) -> &'static [&'static str] {
     }
 }
 
-/// A run of one of the commands in a folder of its own.
+/// A run of one of the commands in its own folder.
 struct Run {
     folder: Folder,
     words: Vec<String>,
@@ -134,7 +135,7 @@ impl Run {
         output.expect("the binary starts")
     }
 
-    /// Which of the outputs are as they were before.
+    /// Which of the outputs are unchanged.
     fn is_old(&self, files: &[Vec<u8>]) -> impl Iterator<Item = bool> {
         let pairs = self.outputs.iter().zip(files);
         pairs.map(|(name, file)| file == old(name))
@@ -146,7 +147,7 @@ impl Run {
     }
 }
 
-/// How often a run makes each kind of call, and what it gives.
+/// Number of calls of each kind in a run, and its results.
 fn undisturbed(run: &Run) -> (BTreeMap<String, usize>, Output, Vec<Vec<u8>>) {
     let log: PathBuf = run.folder.path("calls");
     let output = run.command().env("TORQCOMP_FAULT_LOG", &log).output();
@@ -164,7 +165,7 @@ fn undisturbed(run: &Run) -> (BTreeMap<String, usize>, Output, Vec<Vec<u8>>) {
     (calls, output, files)
 }
 
-/// What is wrong after a fault, if anything.
+/// The problem after a fault, if any.
 fn wrong(run: &Run, fault: &str, new: &(Output, Vec<Vec<u8>>)) -> Option<String> {
     let ending = fault.rsplit(' ').next().expect("an ending");
     let output = run.with_fault(fault);
@@ -191,7 +192,8 @@ fn wrong(run: &Run, fault: &str, new: &(Output, Vec<Vec<u8>>)) -> Option<String>
             (Some(code), ..) => Some(format!("ended with {code}, not by a signal")),
             (_, false, ..) => Some("a file is neither old nor new".to_owned()),
             (.., false, _) => Some(format!("the next run ended with {}", next.status)),
-            // Who made a temporary file, and whether that process is gone, is known on Linux alone.
+            // The creator of a temporary file, and whether that process has ended, is known only on
+            // Linux.
             (.., false) if cfg!(target_os = "linux") => Some(format!("{:?}", run.folder.names())),
             _ => None,
         };
@@ -214,7 +216,7 @@ fn wrong(run: &Run, fault: &str, new: &(Output, Vec<Vec<u8>>)) -> Option<String>
     }
 }
 
-/// The numbers of the calls that fail in turn, out of so many.
+/// The indices of the calls that are made to fail, out of `count`.
 fn chosen(count: usize) -> Vec<usize> {
     match std::env::var("TORQCOMP_FAULTS").is_ok_and(|all| all == "all") || count <= 2 {
         true => (0..count).collect(),
@@ -265,7 +267,7 @@ fn whatever_call_fails_the_old_files_or_the_new_ones_are_there() {
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
-/// Every verb that writes is among those that are attacked.
+/// Every command that writes is among those tested.
 #[test]
 fn every_verb_is_attacked() {
     let help = Command::new(env!("CARGO_BIN_EXE_torqcomp"))

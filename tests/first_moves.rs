@@ -1,4 +1,4 @@
-//! What a new user does first, with numbers that do not fit: never a wrong torque without a word.
+//! First steps of a new user, with inconsistent numbers: never a wrong torque without a warning.
 
 use std::f64::consts::TAU;
 
@@ -6,14 +6,14 @@ use serde_json::Value;
 
 use crate::util::{COMPENSATE, Folder, HARMONICS, assert_close, codes, sampled, steady};
 
-/// A stand of 60 Hz with a calibration and what else its file says.
+/// A stand of 60 Hz with a calibration and further entries.
 fn stand(more: &str) -> String {
     format!(
         "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"60 Hz\"\ndamping_ratio = 0.02\n{more}"
     )
 }
 
-/// Compensates a record of a slow torque beside a stand file.
+/// Compensates a record of a slow torque with a stand file.
 fn compensated(stand: &str, heading: &str, level: f64) -> (Folder, Value) {
     let folder = Folder::new();
     folder.write("stand.toml", stand);
@@ -103,7 +103,7 @@ fn ringing_above_half_the_rate_is_said() {
 fn the_band_stays_below_the_rate_of_new_values() {
     let folder = Folder::new();
     folder.write("stand.toml", stand(""));
-    // 100 values a second, each stored ten times.
+    // 100 values per second, each stored ten times.
     let held = |t: f64| (TAU * 3.0 * ((t * 1000.0).round() / 10.0).floor() / 100.0).sin();
     folder.write("in.csv", over_time("T [N m]", 1000.0, 4000, held));
     let report = folder.json(&[&COMPENSATE[..], &["--json"]].concat());
@@ -114,7 +114,8 @@ fn the_band_stays_below_the_rate_of_new_values() {
     assert_eq!(report["band"]["chosen_from"], "held-samples");
 }
 
-/// A tap on a stand of 180 Hz with a damping ratio of 0.02, beside hum: the hum is no mode, however strong it is.
+/// A tap on a stand of 180 Hz with a damping ratio of 0.02, with hum: the hum is not a mode, however strong it
+/// is.
 #[test]
 fn hum_is_not_taken_for_the_stand() {
     let omega = TAU * 180.0;
@@ -125,7 +126,7 @@ fn hum_is_not_taken_for_the_stand() {
         }
     };
     let mut noise = crate::noise::Noise(3);
-    // The last one is too short to tell the mains from a mode by its frequency alone.
+    // The last one is too short to distinguish the mains from a mode by its frequency alone.
     for (size, count) in [(0.5, 10_000), (0.1, 10_000), (0.03, 10_000), (0.1, 4000)] {
         let folder = Folder::new();
         let noise = (0..count)
@@ -147,7 +148,7 @@ fn hum_is_not_taken_for_the_stand() {
     }
 }
 
-/// The speed of the nameplate is not that of the record: 30 Hz given, 29.7 Hz there.
+/// The speed of the nameplate is not that of the record: 30 Hz given, 29.7 Hz recorded.
 #[test]
 fn a_fundamental_beside_the_line_is_said() {
     let folder = Folder::new();
@@ -172,7 +173,7 @@ fn a_fundamental_beside_the_line_is_said() {
         );
         assert!(warnings.contains("--refine"), "{warnings}");
     }
-    // Beyond the default span of --refine, the advice is one that works.
+    // Beyond the default span of --refine, the advice must be one that works.
     let report = run(29.1, 2.0);
     let advice = "--refine --refine-span 5";
     assert!(report["warnings"].to_string().contains(advice), "{report}");
@@ -190,7 +191,7 @@ fn a_fundamental_beside_the_line_is_said() {
     }
 }
 
-/// Components of a steady speed under a load step are no change of speed; a speed that rises from 25 to 35 Hz is one.
+/// Steady speed under a load step is not a change of speed; a rise from 25 to 35 Hz is one.
 #[test]
 fn a_changing_speed_is_said_and_a_load_step_is_none() {
     let folder = Folder::new();
@@ -217,8 +218,8 @@ fn a_changing_speed_is_said_and_a_load_step_is_none() {
     assert!(changes(&|_| 5.0, &|t| 30.0 * t + 0.005 * t * t));
 }
 
-/// The first cycles of a decay are beyond the recorder's range: the rest has the frequency and the damping, with noise and
-/// without, where the digits of the file are all that is left.
+/// The first cycles of a decay are beyond the recorder's range: the rest has the frequency and the damping, with noise
+/// and without, where only the digits of the file remain.
 #[test]
 fn a_clipped_decay_is_fitted_behind_its_last_clipped_sample() {
     let folder = Folder::new();
@@ -245,7 +246,7 @@ fn a_clipped_decay_is_fitted_behind_its_last_clipped_sample() {
     }
 }
 
-/// A torque that is upside down, or in mN m under a heading in N m, is no effect of the stand.
+/// A torque with the wrong sign, or in mN m under a heading in N m, is not an effect of the stand.
 #[test]
 fn a_wrong_sign_or_unit_is_no_effect() {
     let folder = Folder::new();
@@ -274,7 +275,7 @@ fn a_wrong_sign_or_unit_is_no_effect() {
     assert!(diagnose(1.0).stdout.starts_with("verdict: nothing-missing"));
 }
 
-/// A data sheet says 0.5 % of 12.5 N m/V; 2 % beside a damping ratio of 0.02 can be two things.
+/// A data sheet gives 0.5 % of 12.5 N m/V; 2 % for a damping ratio of 0.02 is ambiguous.
 #[test]
 fn uncertainties_in_percent_are_of_the_value() {
     let folder = Folder::new();
@@ -304,7 +305,8 @@ fn uncertainties_in_percent_are_of_the_value() {
         .says(1, &["line 4", "write \"0.0004\"", "or \"0.02\""]);
 }
 
-/// A ripple of 2 mV at 1600 Hz on a stand of 60 Hz would be 710 times as much torque at rest: torque or a converter's pick-up?
+/// A ripple of 2 mV at 1600 Hz on a stand of 60 Hz would correspond to 710 times the static torque: torque or a
+/// converter's interference?
 #[test]
 fn a_line_that_alone_decides_the_band_is_asked_about() {
     let folder = Folder::new();
@@ -331,7 +333,7 @@ fn a_line_that_alone_decides_the_band_is_asked_about() {
     let (_, band) = text.split_once("give --band ").expect("a band");
     let digits = band.chars().take_while(|c| c.is_ascii_digit() || *c == '.');
     let band: String = digits.collect();
-    // As the answer says: nothing of the ripple is left.
+    // As advised: nothing of the ripple remains.
     let without = run(2e-3, &["--band", &band]);
     assert!(codes(&without).is_empty(), "{without}");
     let slow = 12.5 * 0.5_f64.sqrt() * 0.2_f64.hypot(0.05);
@@ -346,7 +348,7 @@ fn a_line_that_alone_decides_the_band_is_asked_about() {
     assert!(codes(&plain).is_empty(), "{plain}");
 }
 
-/// The zero is that of another record, or mV read under V.
+/// The zero is that of another record, or mV read as V.
 #[test]
 fn a_zero_far_from_the_record_is_said() {
     let with = |zero: &str, heading: &str, level: f64, rated: &str| {
@@ -360,7 +362,7 @@ fn a_zero_far_from_the_record_is_said() {
     };
     let far = "zero-far-from-record".to_owned();
     assert!(with("5 V", "bridge_V", 0.01, "").contains(&far));
-    // A large load on a small zero, and a live zero.
+    // A large load with a small zero, and a live zero.
     assert!(!with("0.01 V", "bridge_V", 5.0, "").contains(&far));
     assert!(!with("5 V", "bridge_V", 1.0, "").contains(&far));
     assert!(!with("0 V", "bridge_V", 0.01, "").contains(&far));
@@ -382,7 +384,7 @@ fn harmonics_say_a_zero_far_from_the_record() {
     assert!(codes(&report).contains(&"zero-far-from-record"), "{report}");
 }
 
-/// The speed stays and the load jumps; and a fundamental far beside the line.
+/// Constant speed with a load step; and a fundamental far from the line.
 #[test]
 fn a_load_step_and_a_far_fundamental_are_said() {
     let folder = Folder::new();
@@ -403,7 +405,7 @@ fn a_load_step_and_a_far_fundamental_are_said() {
     }
     let steady = run(&|_| 5.0, 30.0, "30");
     assert!(!codes(&steady).contains(&"load-changes"), "{steady}");
-    // A component below the fundamental is no change of load.
+    // A component below the fundamental is not a change of load.
     let slow = run(&|t| 5.0 + 2.0 * (TAU * 11.3 * t).sin(), 30.0, "30");
     assert!(!codes(&slow).contains(&"load-changes"), "{slow}");
     let far = run(&|_| 5.0, 16.6, "17.6");
@@ -414,7 +416,7 @@ fn a_load_step_and_a_far_fundamental_are_said() {
     );
 }
 
-/// A logger wrote each row twice, or a block again.
+/// A logger wrote each row twice, or repeated a block.
 #[test]
 fn rows_written_twice_are_named() {
     let folder = Folder::new();
@@ -439,7 +441,8 @@ fn rows_written_twice_are_named() {
         .says(1, &["line 1502", "rows were written twice"]);
 }
 
-/// The applied channel comes late or early, or by another clock; a stand of 590 Hz, driven by 200 sines of all frequencies.
+/// The applied channel is late or early, or on another clock; a stand of 590 Hz, driven by 200 sines of all
+/// frequencies.
 #[test]
 fn an_applied_channel_of_another_time_is_no_effect() {
     let folder = Folder::new();
@@ -480,7 +483,7 @@ fn an_applied_channel_of_another_time_is_no_effect() {
         let stand = ["diagnose", "--stand", "stand.toml", "--train", "in.csv"];
         folder.run(&[&stand[..], &["--applied", "T", "--measured", "M"]].concat())
     };
-    // Refused where the error is large, else warned of.
+    // Rejected if the error is large, otherwise a warning.
     let says = |ran: crate::util::Ran, words: &[&str]| {
         for word in words {
             assert!(ran.stderr.contains(word), "{word}: {ran:?}");
@@ -498,7 +501,7 @@ fn an_applied_channel_of_another_time_is_no_effect() {
     assert!(early.stdout.contains("time-delay"), "{early:?}");
 }
 
-/// The load comes after a second, and clips the record: 5000 samples in.
+/// The load starts after a second, and clips the record: 5000 samples in.
 #[test]
 fn what_happens_later_in_a_record_is_seen() {
     let folder = Folder::new();
@@ -517,7 +520,7 @@ fn what_happens_later_in_a_record_is_seen() {
     ran.says(0, &["in the first 65536 samples"]);
 }
 
-/// A cable that drops out late in a long record, whatever way the record goes.
+/// A cable that drops out late in a long record, whichever way the record is read.
 #[test]
 fn a_drop_out_is_found_behind_the_first_samples() {
     let folder = Folder::new();
@@ -565,8 +568,8 @@ fn ringing_at_another_frequency_than_the_declared_one_is_said() {
     }
 }
 
-/// A mass of 2 kg under a force of two sines, whose motor current is recorded in mA: a factor per A, per mA, and one that
-/// belongs to another quantity.
+/// A mass of 2 kg under a force of two sines, with the motor current recorded in mA: a factor per A, per mA, and one
+/// for another quantity.
 #[test]
 fn a_torque_factor_is_in_a_unit_of_its_own() {
     let folder = Folder::new();
@@ -592,7 +595,7 @@ fn a_torque_factor_is_in_a_unit_of_its_own() {
     ran.says(1, &["10 N/V", "mA"]);
 }
 
-/// A stand file that a diagnosis wrote without an explanation.
+/// A stand file from a diagnosis without an explanation.
 #[test]
 fn an_unexplained_diagnosis_is_said_where_its_file_is_used() {
     for (verdict, count) in [
@@ -611,7 +614,7 @@ fn an_unexplained_diagnosis_is_said_where_its_file_is_used() {
     }
 }
 
-/// A mark for no value, behind the samples that are looked at more closely.
+/// A missing-value marker, after the samples that are examined more closely.
 #[test]
 fn a_mark_for_no_value_is_said_wherever_it_is() {
     let folder = Folder::new();

@@ -1,17 +1,17 @@
-//! What labs' files say in headings, heads and columns of their own, as new users bring them.
+//! Lab files with their own headings, headers and columns, as new users bring them.
 
 use serde_json::Value;
 
 use crate::util::{COMPENSATE, Folder, assert_close};
 
-/// A stand that takes torque and volts.
+/// A stand that accepts torque and volts.
 const STAND: &str = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"60 Hz\"\ndamping_ratio = 0.02\n";
 
 fn torque(row: usize) -> f64 {
     (row as f64 / 50.0).sin()
 }
 
-/// A file with a head, and rows of some cells before the torque.
+/// A file with a header, and rows of some cells before the torque.
 fn file(head: &str, cells: impl Fn(usize) -> String) -> String {
     let rows = (0..3000).map(|row| format!("{},{:.5}\n", cells(row), torque(row)));
     format!("{head}\n{}", rows.collect::<String>())
@@ -51,7 +51,7 @@ fn units_behind_an_underscore_are_read() {
         let run = folder.run(&[&COMPENSATE[..], &["--force"]].concat());
         run.says(1, &["with a force or with a mass"]);
     }
-    // The answer to the question is no contradiction.
+    // The answer to the question is not a contradiction.
     folder.write(
         "in.csv",
         file("time_s,torque_lbft", |row| {
@@ -142,7 +142,7 @@ fn dates_in_the_head_are_of_iso_8601_where_they_can_be_read_in_one_way() {
     }
 }
 
-/// Joints change places from row to row, as nodes write them that list them out of a map.
+/// Joints change places between rows, as written by nodes that list them from a map.
 #[test]
 fn an_item_of_a_list_is_followed_by_its_name() {
     let folder = Folder::new();

@@ -1,5 +1,5 @@
-//! WAV, universal files and MATLAB 5, written here by code that shares nothing with the readers: numbers, units, rates and times
-//! as they went in, through every verb, and what is damaged or missing is told.
+//! WAV, universal files and MATLAB 5, written here by code independent of the readers: numbers, units, rates and times
+//! survive every command, and damage or missing data are reported.
 
 use serde_json::Value;
 
@@ -7,13 +7,13 @@ use crate::util::{Folder, column, steady, table};
 
 const RATE: u32 = 20_000;
 
-/// A signal of values that 16 bits hold exactly.
+/// A signal of values that are exact in 16 bits.
 fn signal(count: usize) -> Vec<f64> {
     let value = |i: usize| (20_000.0 * (0.01 * i as f64).sin()).round() / 32_768.0;
     (0..count).map(value).collect()
 }
 
-/// How a WAV file stores its samples: format, bits, and the bytes of a fraction of full scale.
+/// Sample storage of a WAV file: format, bits, and the bytes of a fraction of full scale.
 type Stored = (u16, u16, fn(f64) -> Vec<u8>);
 
 const STORED: [Stored; 6] = [
@@ -80,7 +80,7 @@ fn samples_of_wav_are_what_full_scale_makes_of_them() {
             let (head, rows) = table(&ran.stdout);
             assert_eq!(head, ["time_s", "channel 2 [V]"]);
             assert_eq!(rows.len(), 500);
-            // Half of a step of the coarsest.
+            // Half a step of the coarsest.
             let bound = match stored.1 {
                 bits @ (8 | 16) => 5.0 / 2.0_f64.powi(i32::from(bits)),
                 _ => 1e-6,
@@ -171,7 +171,7 @@ fn a_wav_file_that_ends_early_loses_what_is_not_there() {
     }
 }
 
-/// A data set 58: kind of number, whether the abscissa is even, order of bytes or text.
+/// A data set 58: kind of number, whether the abscissa is uniform, byte order or text.
 fn data_set(kind: u8, is_even: bool, order: Option<bool>, samples: &[f64]) -> Vec<u8> {
     let step = 1.0 / 44_100.0;
     let mut head = String::from("bridge\n\n\n\n\n");
@@ -200,7 +200,7 @@ fn data_set(kind: u8, is_even: bool, order: Option<bool>, samples: &[f64]) -> Ve
         set.extend(format!("{:>6}\n{head}", 58).bytes());
         let (width, digits, a_line) = if kind == 2 { (13, 5, 6) } else { (20, 11, 4) };
         for line in numbers.chunks(a_line) {
-            // Without spaces between them where a sign fills the field.
+            // Without spaces between them if a sign fills the field.
             let cells = line.iter().enumerate();
             let cells = cells.map(|(i, v)| match kind == 4 && !is_even && i % 2 == 0 {
                 true => format!("{:>13}", e(*v, 5)),
@@ -242,7 +242,7 @@ fn data_set(kind: u8, is_even: bool, order: Option<bool>, samples: &[f64]) -> Ve
     set
 }
 
-/// A number as FORTRAN's format `E` with so many digits behind the point has it.
+/// A number in FORTRAN format `E` with this many digits after the point.
 fn e(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$E}");
     let (mantissa, power) = text.split_once('E').unwrap();
@@ -262,7 +262,7 @@ fn functions_of_universal_files_are_channels() {
         for is_even in [true, false] {
             for order in [None, Some(true), Some(false)] {
                 let mut file = data_set(kind, is_even, order, &samples);
-                // Units of the file, which are no function, and a second function.
+                // Units of the file, which are not a function, and a second function.
                 file.extend(b"    -1\n   164\n         1SI: Meter (newton)         2\n    -1\n");
                 file.extend(data_set(kind, is_even, order, &samples[..20]));
                 folder.write("a.dat", &file);
@@ -311,7 +311,7 @@ fn a_universal_file_that_ends_early_loses_samples() {
     folder.run(&["extract", "a.uff"]).says(1, &["IEEE 754"]);
 }
 
-/// An element of a MATLAB file, filled up to eight bytes.
+/// An element of a MATLAB file, padded to eight bytes.
 fn element(kind: u32, content: &[u8], is_little: bool) -> Vec<u8> {
     let mut bytes: Vec<u8> = [kind, content.len() as u32]
         .iter()
@@ -407,7 +407,7 @@ fn vectors_of_matlab_are_channels_on_their_time() {
             "{}",
             ran.stderr
         );
-        // A rate in place of a vector of time; without either, it is asked for.
+        // A rate instead of a time vector; without either, it is asked for.
         folder.write(
             "a.mat",
             matlab(&[of("Fs", &[2000.0]), of("x", &values)], is_little),
@@ -474,7 +474,7 @@ fn files_of_other_programs_are_refused_with_the_way_to_convert_them() {
     folder.run(&["inspect", "new.mat"]).says(1, &["-v7"]);
     folder.write("a.h5", b"\x89HDF\r\n\x1a\n");
     folder.run(&["inspect", "a.h5"]).says(1, &["HDF5"]);
-    // In a folder, they are left out, and recordings of these formats are not.
+    // In a folder, they are left out, but recordings of these formats are not.
     std::fs::create_dir(folder.path("logs")).unwrap();
     folder.write(
         "logs/bag.db3",

@@ -1,4 +1,4 @@
-//! `diagnose` of a body without a spring, through the binary, on records that are simulated here.
+//! `diagnose` of a body without a spring, through the binary, on records simulated here.
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -25,8 +25,8 @@ const DRIVE: Body = Body {
 };
 
 impl Body {
-    /// Torque and angle while a controller follows a sum of sines, beside a constant load; with 50 steps from sample to
-    /// sample, in each of which dry friction takes as much of the speed as it can.
+    /// Torque and angle while a controller follows a sum of sines, with a constant load; 50 steps per sample, in each
+    /// of which dry friction removes up to the whole speed.
     fn record(&self, count: usize, seed: u64) -> String {
         const STEPS: usize = 50;
         let h = 1.0 / (RATE_HZ * STEPS as f64);
@@ -103,7 +103,7 @@ fn inertia_and_friction_of_a_free_body_are_found() {
         .map(|w| &w["code"]);
     assert!(codes.into_iter().any(|code| code == "free-body"));
 
-    // What came out of the file as what acts, from the motion alone and but for the constant load.
+    // The applied torque of the file, from the motion alone and except for the constant load.
     let args = [
         "compensate",
         "holdout.csv",
@@ -136,7 +136,7 @@ fn a_free_body_without_friction_lacks_nothing() {
     near(&report["constants"], "damping", "after", 0.03, 0.02);
 }
 
-/// A stand with a spring whose record is too short is no free body.
+/// A stand with a spring whose record is too short is not a free body.
 #[test]
 fn a_short_record_of_a_stand_with_a_spring_is_refused() {
     let folder = Folder::new();

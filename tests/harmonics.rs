@@ -1,4 +1,4 @@
-//! `harmonics` against a record whose components are known.
+//! `harmonics` on a record with known components.
 
 use crate::noise::Noise;
 use crate::util::{Folder, HARMONICS, hertel_response, record, steady};
@@ -106,7 +106,8 @@ fn orders_that_cannot_be_seen_are_said() {
         .says(1, &["could not be refined"]);
 }
 
-/// Torque at three orders of a shaft whose angle sways by `sway_rad` at 2 Hz, at an exact mean speed.
+/// Torque at three orders of a shaft whose angle oscillates by `sway_rad` at 2 Hz, at an exact mean
+/// speed.
 fn swaying(frequency_hz: f64, sway_rad: f64, hum: f64) -> String {
     let mut noise = Noise(9);
     let samples: Vec<f64> = (0..40_000)
@@ -122,7 +123,7 @@ fn swaying(frequency_hz: f64, sway_rad: f64, hum: f64) -> String {
     record(&samples, 10_000.0)
 }
 
-/// What is wrong with the speed is said where it changes a component, and only there.
+/// A faulty speed is reported where it changes a component, and only there.
 #[test]
 fn a_speed_that_sways_or_is_off_is_said() {
     let folder = Folder::new();
@@ -144,10 +145,10 @@ fn a_speed_that_sways_or_is_off_is_said() {
             .collect()
     };
     assert!(codes(swaying(47.3, 0.0, 0.0), "47.3").is_empty());
-    // The seventh order comes out by J0(0.7), 12 %, too small; for 0.01 rad by 0.1 %.
+    // The seventh order is too small by 12 %, J0(0.7); for 0.01 rad by 0.1 %.
     assert_eq!(codes(swaying(47.3, 0.1, 0.0), "47.3"), ["speed-changes"]);
     assert!(codes(swaying(47.3, 0.01, 0.0), "47.3").is_empty());
-    // In 4 s the seventh order turns by 0.14 of a turn against 47.305 Hz.
+    // In 4 s the seventh order turns by 0.14 of a turn relative to 47.305 Hz.
     assert_eq!(
         codes(swaying(47.3, 0.0, 0.0), "47.305"),
         ["fundamental-off"]

@@ -1,4 +1,4 @@
-//! `inspect` through the binary: what it reports of records with known faults.
+//! `inspect` through the binary: its report on records with known faults.
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::noise::Noise;
 use crate::util::{Folder, codes};
 
-/// White noise of unit variance, seeded.
+/// Seeded white noise of unit variance.
 fn noise(seed: u64, count: usize) -> Vec<f64> {
     let mut noise = Noise(seed);
     (0..count).map(|_| noise.normal()).collect()
@@ -250,7 +250,7 @@ fn files_are_compared() {
         codes(&report),
         ["identical-files", "channel-multiple", "channel-copy"]
     );
-    // One of several cannot be read: the others are, and the run fails.
+    // One of several cannot be read: the others are reported, and the run fails.
     let ran = folder.run(&["inspect", "one.csv", "missing.csv", "--json"]);
     assert_eq!(ran.code, 1);
     assert!(ran.stderr.contains("missing.csv"), "{}", ran.stderr);

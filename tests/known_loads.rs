@@ -1,5 +1,5 @@
-//! `diagnose --static`: known loads beside free ringing. What the stand shows of a load at rest is solved here by bisection, and
-//! for dry friction written down.
+//! `diagnose --static`: known loads in addition to free decays. The static response of the stand is solved here by
+//! bisection, and in closed form for dry friction.
 
 use serde_json::{Value, json};
 
@@ -27,7 +27,7 @@ const DIAGNOSE: [&str; 9] = [
 ];
 const APPLIED: [&str; 2] = ["--applied", "load"];
 
-/// A folder with two hits and a table of loads, the readings in mV.
+/// A folder with two hits and a table of loads, with the readings in mV.
 fn folder(stand: &Stand, shown: impl Fn(f64) -> f64) -> Folder {
     let mut noise = Noise(7);
     let rows = LOADS.iter().map(|load| {
@@ -44,7 +44,7 @@ fn folder(stand: &Stand, shown: impl Fn(f64) -> f64) -> Folder {
     folder
 }
 
-/// Where `x + c x³ = pushed`.
+/// Solution of `x + c x³ = pushed`.
 fn bent(cubic: f64, pushed: f64) -> f64 {
     let (mut low, mut high) = (-10.0, 10.0);
     for _ in 0..100 {
@@ -87,14 +87,14 @@ fn loads_give_the_gain_and_bear_out_a_spring_that_stiffens() {
     );
     assert_eq!(loads["gain_unit"], "V/(N m)");
     assert_eq!(codes(&report), [""; 0]);
-    // The stand file has the gain, with its uncertainty, and says which load a slow reading comes from.
+    // The stand file has the gain with its uncertainty, and gives the load of a slow reading.
     let refined = folder.read("refined.toml");
     assert!(
         refined.contains("static_gain = { value = \"0.0"),
         "{refined}"
     );
     assert!(refined.contains("first.csv, loads.csv"), "{refined}");
-    // What is said of the time axis of the hits is not said of the table.
+    // Notes on the time axis of the hits do not apply to the table.
     let text = [&DIAGNOSE[..], &APPLIED, &["--time-column", "1"]].concat();
     let text = folder.run(&text).stdout;
     let said = [
@@ -109,7 +109,7 @@ fn loads_give_the_gain_and_bear_out_a_spring_that_stiffens() {
 fn loads_show_the_loop_of_dry_friction_that_ringing_tells_of() {
     let friction = 0.01;
     let stand = Stand { friction, ..PLAIN };
-    // On the way up the spring takes so much less, on the way down so much more.
+    // On the way up the spring carries less by this amount, on the way down more.
     let mut before = 0.0;
     let mut shown = Vec::new();
     for pushed in LOADS.map(|load| GAIN * load) {
@@ -129,7 +129,8 @@ fn loads_show_the_loop_of_dry_friction_that_ringing_tells_of() {
 
 #[test]
 fn loads_that_contradict_are_said() {
-    // The loads are on a straight line though the ringing bends; and the stand file has another gain.
+    // The loads are on a straight line although the decay is nonlinear; and the stand file has
+    // another gain.
     let stand = Stand {
         cubic: 0.05,
         ..PLAIN

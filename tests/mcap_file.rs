@@ -6,7 +6,7 @@ use std::io::Cursor;
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions, Writer};
 
-/// A file that is written.
+/// A file being written.
 pub struct McapFile(Writer<Cursor<Vec<u8>>>);
 
 impl McapFile {
@@ -57,7 +57,7 @@ impl McapFile {
     }
 }
 
-/// CDR, little endian: values aligned to their size, counted from behind the head.
+/// CDR, little endian: values aligned to their size, relative to the end of the header.
 pub struct Cdr(pub Vec<u8>);
 
 impl Cdr {

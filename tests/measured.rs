@@ -1,7 +1,7 @@
-//! Tests on recordings made by others, read from `TORQCOMP_MEASURED` (or `../shared/measured`).
+//! Tests on third-party recordings, read from `TORQCOMP_MEASURED` (or `../shared/measured`).
 //!
-//! They are not part of the project. Where the folder is missing, the tests are reported as ignored, before and after the
-//! summary; with `TORQCOMP_REQUIRE_MEASURED=1`, as CI sets it, they fail.
+//! They are not part of the project. If the folder is missing, the tests are reported as ignored, before and after the
+//! summary; with `TORQCOMP_REQUIRE_MEASURED=1`, as set by CI, they fail.
 
 #[path = "measured/closing.rs"]
 mod closing;
@@ -21,8 +21,8 @@ mod recordings;
 use libtest_mimic::{Arguments, Failed, Trial};
 use serde_json::Value;
 
-/// A stand for records that are torque already or come without a calibration of their own; what it
-/// says about the recordings is not of interest, what comes out of the chain is.
+/// A stand for records that are torque already or come without a calibration; only the output of
+/// the chain matters here, not what it implies about the recordings.
 const STAND: &str = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"120 Hz\"\n\
                      damping_ratio = 0.05\n[calibration]\ntorque_per_volt = \"100 N m/V\"\n";
 
@@ -120,7 +120,7 @@ fn rows(text: &str) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Bridge volts under a preamble, a units row and an odd line, the time in the last column.
+/// Bridge volts under a preamble, a units row and an odd line, with the time in the last column.
 fn strain_beam(folder: &Path) -> Result<(), Failed> {
     let file = folder.join("strain_beam/set0_test0.txt");
     let path = file.to_str().unwrap_or_default();
@@ -157,7 +157,7 @@ fn strain_beam(folder: &Path) -> Result<(), Failed> {
         "time stamps differ",
     )?;
     check(err.contains("5000 Hz"), &err)?;
-    // The mean goes through with the static gain of 100 N m/V.
+    // The mean is scaled by the static gain of 100 N m/V.
     let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / data.len() as f64;
     let (torque, volts) = (
         mean(&mut rows.iter().map(|r| r[1])),
@@ -185,7 +185,7 @@ fn strain_beam(folder: &Path) -> Result<(), Failed> {
     check(code == 0 && out.contains("torque N m"), &err)
 }
 
-/// A heading without a unit, trailing tabs, padded cells; 60 lines a turn at 60 rpm.
+/// A heading without a unit, trailing tabs, padded cells; 60 lines per turn at 60 rpm.
 fn torque_transducer(folder: &Path) -> Result<(), Failed> {
     let file = folder.join("torque_transducer/generating__60rpm-torque__ILC-OFF_0pc-load.txt");
     let path = file.to_str().unwrap_or_default();
@@ -215,7 +215,7 @@ fn torque_transducer(folder: &Path) -> Result<(), Failed> {
         (speed - 1.0).abs() < 0.01,
         format!("one turn a second, got {speed}"),
     )?;
-    // The line at 60 Hz, amplitude by a plain sum over whole seconds.
+    // The line at 60 Hz, with its amplitude by a plain sum over whole seconds.
     let samples: Vec<f64> = std::fs::read_to_string(&file)?
         .lines()
         .filter_map(|line| line.split('\t').nth(1)?.trim().parse().ok())
@@ -460,8 +460,8 @@ fn ringing(folder: &Path) -> Result<(), Failed> {
             check((0.0011..=0.0015).contains(&ratio), format!("{ratio}"))?;
         }
     }
-    // The second calibration record rings lower than the range that goes with these data: every minute of it has
-    // its strongest line between 0.347 and 0.356 Hz (Lomb's periodogram), so that is what it holds.
+    // The second calibration record rings lower than the published range for these data: every minute of it has
+    // its strongest line between 0.347 and 0.356 Hz (Lomb's periodogram), which is the reference here.
     let path = folder.join("thrust_balance/2.caldata_m4_l5_F9_725.txt");
     let report = identified(&[&["decay", path.to_str().unwrap_or_default()], &args[..]].concat())?;
     let got = number(&report, "natural_frequency")?;

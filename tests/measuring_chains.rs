@@ -1,4 +1,4 @@
-//! The measuring chains that labs have: one torque, however its signal is recorded, written and calibrated.
+//! Typical measuring chains of labs: one torque, however its signal is recorded, written and calibrated.
 
 use std::f64::consts::TAU;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::util::{Folder, HARMONICS, sampled};
 
-/// Samples per second, and of a record: 20 periods of 10 Hz.
+/// Sampling rate, and number of samples of a record: 20 periods of 10 Hz.
 const RATE_HZ: f64 = 1000.0;
 const SAMPLES: usize = 2000;
 const TONE_HZ: f64 = 10.0;
@@ -33,7 +33,7 @@ const N_M_PER_STRAIN: f64 = 200e9 * 0.02 * 1e-4 * 0.1 / (6.0 * 0.15);
 
 const MECHANICS: &str = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"590 Hz\"\ndamping_ratio = 0.02\n";
 
-/// `U/E` of each layout at a relative change `d` of a gage's resistance, by Kirchhoff's laws, arms of one size.
+/// `U/E` of each layout at a relative change `d` of a gage's resistance, by Kirchhoff's laws, for equal arms.
 fn bridge(layout: &str, d: f64) -> f64 {
     let nu = 0.3;
     match layout {
@@ -56,7 +56,7 @@ fn record(heading: &str, unit_row: Option<&str>, signal: impl Fn(f64) -> f64) ->
     }
 }
 
-/// Recorded amplitude of the 10 Hz in N m, before the stand is divided out, and the whole report.
+/// Recorded amplitude at 10 Hz in N m, before the stand is divided out, and the whole report.
 fn amplitude(folder: &Folder, more: &[&str]) -> (f64, serde_json::Value) {
     let report = folder.json(&[&HARMONICS[..], &["10", "--orders", "1", "--json"], more].concat());
     (
@@ -78,7 +78,7 @@ fn close(got: f64, want: f64, what: &str) {
     );
 }
 
-/// 1 mV/V, 10 mV at 10 V and 500 µε of a full bridge with gage factor 2 are one torque; and so for every layout.
+/// 1 mV/V, 10 mV at 10 V and 500 µε of a full bridge with gage factor 2 are the same torque, for every layout.
 #[test]
 fn one_signal_in_volts_ratio_and_strain_is_one_torque() {
     let layouts = [
@@ -184,10 +184,11 @@ fn what_could_be_strain_or_ratio_is_asked() {
     assert!(said.contains("in-lbm"), "{said}");
 }
 
-/// Name, lines of `[calibration]`, heading, swing and middle of the record, relative standard uncertainty.
+/// Name, lines of `[calibration]`, heading, amplitude and middle of the record, relative standard
+/// uncertainty.
 type Form<'a> = (&'a str, String, &'a str, f64, f64, Option<f64>);
 
-/// One transducer of 25 N m per mV/V in every form that its papers give, recorded in every way.
+/// One transducer of 25 N m per mV/V in every form that data sheets use, recorded in every way.
 #[test]
 fn every_form_of_a_calibration_gives_one_torque_and_its_uncertainty() {
     let table = "points = [\n{ reading = \"-2 mV/V\", torque = \"-50 N m\", std = \"0.1 N m\" },\n\
@@ -242,8 +243,8 @@ fn every_form_of_a_calibration_gives_one_torque_and_its_uncertainty() {
     }
 }
 
-/// A calibration in mV/V serves a record in volts, and the other way round, through supply and gain: 5 V and 200 make
-/// 1 V of 1 mV/V.
+/// A calibration in mV/V applies to a record in volts, and vice versa, through supply and gain: 5 V and 200 make 1 V
+/// of 1 mV/V.
 #[test]
 fn volts_and_ratios_meet_at_the_supply() {
     let folder = Folder::new();
@@ -325,7 +326,7 @@ fn nothing_is_assumed_silently() {
     );
     let said = refusal(&folder, &[]);
     assert!(said.contains("\"12.5 N m/V\""), "{said}");
-    // Turns are no cycles of a signal.
+    // Turns are not cycles of a signal.
     folder.write("in.csv", record("n [rpm]", None, |c| 1500.0 + c));
     let frequency =
         "zero_frequency = \"60 kHz\"\nfrequency_at_rated = \"90 kHz\"\nrated_torque = \"50 N m\"\n";
@@ -426,7 +427,7 @@ fn loads_in_kilograms_take_the_local_gravity() {
     close(constant["value"].as_f64().unwrap(), 49.05 / 2.0, "N m/V");
 }
 
-/// A simulated record in mV/V reads the torque that was applied.
+/// A simulated record in mV/V reads the applied torque.
 #[test]
 fn a_simulated_record_is_in_the_unit_of_the_calibration() {
     let folder = Folder::new();
@@ -455,12 +456,12 @@ fn a_simulated_record_is_in_the_unit_of_the_calibration() {
                 .abs(),
         )
     });
-    // 1 mV/V, less the 0.03 % by which the stand is more than static at 10 Hz.
+    // 1 mV/V, minus the 0.03 % by which the response at 10 Hz exceeds the static one.
     close(largest, 1.0, "mV/V");
 }
 
-/// `std` of the recorder, correlations of the constants, parameters of effects and the static gain: all of it is in the
-/// stated uncertainty.
+/// `std` of the recorder, correlations of the constants, parameters of effects and the static gain: all contribute to
+/// the stated uncertainty.
 #[test]
 fn every_std_of_the_stand_file_is_stated() {
     let folder = Folder::new();
@@ -495,7 +496,7 @@ fn every_std_of_the_stand_file_is_stated() {
         (magnitude - 0.005).abs() < 1e-6 && (phase.to_radians() - 0.005).abs() < 1e-6,
         "{magnitude} {phase}"
     );
-    // J, f and K with one common relative error: the response does not depend on it.
+    // J, f and K with one common relative error, on which the response does not depend.
     let constants = "schema = \"torqcomp.stand/1\"\n[mechanics]\n\
         inertia = { value = \"2 kg m^2\", std = \"0.1 kg m^2\" }\n\
         damping = { value = \"12 N m s/rad\", std = \"0.6 N m s/rad\" }\n\
@@ -576,8 +577,8 @@ fn the_examples_of_the_stand_file_read_what_they_say() {
     assert_eq!(examples, 12);
 }
 
-/// What `init` writes is a stand file that converts a record: 25 N m at 1 mV/V from papers and weights, 22.2 N m from the
-/// drawing.
+/// The output of `init` is a stand file that converts a record: 25 N m at 1 mV/V from data sheets and weights, 22.2 N m
+/// from the drawing.
 #[test]
 fn init_writes_a_stand_file_that_converts() {
     let mechanics = [
@@ -655,7 +656,7 @@ fn init_writes_a_stand_file_that_converts() {
     assert!(folder.read("fan.toml").contains(named));
 }
 
-/// The file claims the uncertainties that are given, and no other.
+/// The file states the given uncertainties, and no others.
 #[test]
 fn init_takes_the_uncertainties_that_are_given() {
     let folder = Folder::new();
@@ -710,8 +711,8 @@ fn init_takes_the_uncertainties_that_are_given() {
     }
 }
 
-/// What could silently give a wrong torque is asked or said: a rate in 1/s, a gain beside a calibration of recorded volts, a
-/// scale behind the unit.
+/// Possible silent errors of the torque are asked about or reported: a rate in 1/s, a gain with a calibration of
+/// recorded volts, a scale after the unit.
 #[test]
 fn doubtful_numbers_are_asked_or_said() {
     let folder = Folder::new();

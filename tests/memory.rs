@@ -1,4 +1,4 @@
-//! Peak memory of the verbs on records of two lengths: what grows with the record, and by how much a row.
+//! Peak memory of the commands on records of two lengths: growth with the record, in bytes per row.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -6,13 +6,13 @@ use std::process::Stdio;
 
 use crate::util::{Folder, command};
 
-/// Rows of the two records; the pieces that verbs work on are shorter than the first.
+/// Numbers of rows of the two records; the pieces processed by commands are shorter than the first.
 const ROWS: [usize; 2] = [400_000, 1_200_000];
-/// Bytes a row that count as none: pieces of several sizes leave gaps between them.
+/// Bytes per row that count as zero: pieces of several sizes leave gaps between them.
 const NONE: f64 = 12.0;
 
-/// A record of 20 kHz with some of its channels: torque, bridge voltage, a decay that begins anew every 2 s, and noise with the
-/// answer of a resonance to it.
+/// A record at 20 kHz with some of its channels: torque, bridge voltage, a decay that restarts every 2 s, and noise
+/// with the response of a resonance to it.
 fn record(rows: usize, channels: &[&str]) -> String {
     let names: Vec<String> = channels.iter().map(|name| format!(",{name}")).collect();
     let mut text = format!("time_s{}\n", names.concat());
@@ -25,7 +25,7 @@ fn record(rows: usize, channels: &[&str]) -> String {
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1);
         let applied = (noise >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
-        // A resonance at 0.3 rad a sample: 955 Hz.
+        // A resonance at 0.3 rad per sample: 955 Hz.
         let (slow, fast) = (18.0 * t, 47.0 * t);
         let angle = slow.sin() + 0.2 * fast.sin();
         // 0.01 θ'' + 0.5 θ', in N m.
@@ -56,7 +56,7 @@ fn record(rows: usize, channels: &[&str]) -> String {
     text
 }
 
-/// Largest resident memory of a run so far, in bytes.
+/// Peak resident memory of a run so far, in bytes.
 fn peak(process: u32) -> Option<f64> {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let line = status
@@ -66,7 +66,7 @@ fn peak(process: u32) -> Option<f64> {
     Some(1024.0 * kibibytes)
 }
 
-/// Largest resident memory of a run that must succeed, in bytes.
+/// Peak resident memory of a run that must succeed, in bytes.
 fn peak_of(folder: &Folder, args: &[&str]) -> f64 {
     let mut child = command(&folder.path(""), args)
         .stdout(Stdio::null())
@@ -84,8 +84,8 @@ fn peak_of(folder: &Folder, args: &[&str]) -> f64 {
     }
 }
 
-/// A verb, the channels of its record, the rows of a short and a long one, and the most bytes a row that docs/reliability.md
-/// states.
+/// A command, the channels of its record, the rows of a short and a long one, and the maximum bytes per row stated in
+/// docs/reliability.md.
 type Measured = (&'static str, &'static [&'static str], [usize; 2], f64);
 
 const VERBS: [Measured; 9] = [
@@ -142,7 +142,7 @@ const VERBS: [Measured; 9] = [
     ),
 ];
 
-/// The stand of `stand.toml` with an effect that no response describes.
+/// The stand of `stand.toml` with an effect without a frequency response.
 const EFFECT: &str = "\n[[effects]]\nkind = \"cubic-stiffness\"\nform = \"beside\"\ncoefficient = \"1e-5 N m/(N m)^3\"\n";
 
 #[test]
@@ -171,7 +171,7 @@ fn memory_grows_by_no_more_than_is_stated() {
     assert!(wrong.is_empty(), "{wrong}");
 }
 
-/// A bomb of compressed rows costs no more memory than its text.
+/// A decompression bomb of rows takes no more memory than its text.
 #[test]
 fn a_packed_record_takes_as_much_as_its_text() {
     let folder = Folder::new();
@@ -194,7 +194,7 @@ fn a_packed_record_takes_as_much_as_its_text() {
     assert!(packed < plain + 4e6, "{plain} and {packed} bytes");
 }
 
-/// What cannot have room is refused before anything is read or written.
+/// Data that cannot fit is rejected before anything is read or written.
 #[test]
 fn a_text_without_room_is_refused() {
     let folder = Folder::new();
@@ -202,7 +202,7 @@ fn a_text_without_room_is_refused() {
     let file = std::fs::File::options()
         .write(true)
         .open(folder.path("long.csv"));
-    // The rest takes no room on the disk.
+    // The rest takes no space on the disk.
     file.expect("a file").set_len(3 << 30).expect("a length");
     let script = "ulimit -v 1000000; exec \"$0\" identify decay long.csv -o out.toml";
     let ran = std::process::Command::new("sh")

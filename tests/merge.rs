@@ -1,4 +1,4 @@
-//! Manifests of several runs joined into the table of one.
+//! Manifests of several runs merged into the table of one.
 
 use serde_json::Value;
 
@@ -7,7 +7,7 @@ use crate::util::{Folder, HERTEL, Ran};
 
 const RUN: [&str; 6] = ["compensate", "logs", "--stand", "stand.toml", "-o", "out/"];
 const MERGE: [&str; 4] = ["merge", "out/", "-o", "merged.csv"];
-/// Recordings of which each of three parts has some.
+/// Number of recordings, distributed over three parts.
 const COUNT: usize = 9;
 
 fn manifest(part: usize) -> String {
@@ -49,7 +49,7 @@ fn files(folder: &Folder, part: usize) -> Vec<String> {
         .collect()
 }
 
-/// Checks that the manifests are refused and no table is there.
+/// Checks that the manifests are rejected and no table exists.
 fn refused(folder: &Folder, parts: &[&str]) {
     let ran = folder.run(&MERGE);
     ran.says(1, parts);
@@ -89,7 +89,7 @@ fn parts_merged_are_the_table_of_one_run_byte_for_byte() {
     let pattern = folder.run(&["merge", "out/*-of-3.jsonl", "--quiet"]);
     assert_eq!(pattern.stdout, table);
     assert!(!pattern.stderr.contains("10 recordings of"));
-    // That of the one run is complete by itself.
+    // The manifest of the single run is complete by itself.
     assert_eq!(folder.run(&["merge", "one"]).stdout, table);
     folder
         .run(&MERGE)
@@ -159,7 +159,7 @@ fn a_part_that_is_there_twice_counts_once_if_its_results_are_the_same() {
     let said = format!("{count} recordings in more than one manifest with the same result");
     folder.run(&twice).says(1, &[&said, "corrupt.csv"]);
     assert!(folder.read("twice.csv") == table);
-    // The manifest itself, named twice, is one.
+    // The same manifest named twice counts once.
     let same = folder.run(&["merge", "out", &manifest(2)]);
     assert!(same.stdout == table && !same.stderr.contains("more than one"));
 
@@ -190,7 +190,7 @@ fn a_run_that_was_cut_off_is_named_and_goes_on() {
     assert_eq!(folder.run(&MERGE).code, 1);
     let table = folder.read("merged.csv");
     std::fs::remove_file(folder.path("merged.csv")).unwrap();
-    // As a kill leaves it: the last result without its line, and a line that is cut.
+    // As after a kill: the last result without its line, and a truncated line.
     let whole = folder.read(&manifest(2));
     let lines: Vec<&str> = whole.lines().collect();
     let (end, last) = (lines.len() - 1, lines[lines.len() - 2]);
@@ -216,7 +216,7 @@ fn a_run_that_was_cut_off_is_named_and_goes_on() {
     assert_eq!(folder.run(&MERGE).code, 1);
     assert!(folder.read("merged.csv") == table);
     std::fs::remove_file(folder.path("merged.csv")).unwrap();
-    // A run that only skips says of which recordings, so that those that it did not reach are known.
+    // A run that only skips lists its recordings, so that those that it did not reach are known.
     assert_eq!(run_part(&folder, 2, &["--skip-existing"]).code, code);
     let whole = folder.read(&manifest(2));
     let before = whole.trim_end().rfind('\n').unwrap();
@@ -296,7 +296,7 @@ fn runs_of_different_jobs_are_refused() {
         second.replace("\"shard\":\"2/3\"", "\"shard\":\"2/4\""),
     );
     refused(&folder, &["[other-parts]", "part 2/4 instead of part 1/3"]);
-    // A recording more that belongs to another part is seen by the number of all.
+    // An additional recording of another part is detected by the total number.
     put(&folder, "logs/new.csv", log(3));
     folder.write(&manifest(2), &second);
     again(&[]);

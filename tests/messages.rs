@@ -1,4 +1,4 @@
-//! Verbs that need records as a whole, with signals of an MCAP file.
+//! Commands that need whole records, with signals of an MCAP file.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -58,7 +58,7 @@ fn stamp(i: usize) -> u64 {
     BEGIN_NS + (i as u64) * 1_000_000
 }
 
-/// The folder with the stand, the applied signal as a table, and what the stand answers to it.
+/// The folder with the stand, the applied signal as a table, and the stand's response to it.
 fn folder() -> (Folder, Vec<f64>) {
     let folder = Folder::new();
     folder.write("modal.toml", STAND);
@@ -109,7 +109,7 @@ fn simulate_takes_a_signal() {
     for (row, want) in rows.iter().zip(&answer) {
         assert!((row[1] - want).abs() < 1e-9, "{row:?} {want}");
     }
-    // An f64 keeps times since 1970 to a quarter of a microsecond.
+    // An f64 represents times since 1970 to a quarter of a microsecond.
     assert!(rows[0][0] > 1e9 && (rows[1][0] - rows[0][0] - 1e-3).abs() < 1e-6);
     folder
         .run(&[
@@ -195,7 +195,7 @@ fn diagnose_brings_topics_with_other_stamps_together_and_says_so() {
             format!("{{\"v\":{:e}}}", applied(i as f64 / RATE_HZ)),
         )
     });
-    // The answer is stamped as it comes: up to a fifth of a step late.
+    // The response has arrival stamps: up to a fifth of a step late.
     let late = |i: usize| (i as u64 * 7919) % 200_000;
     let between = |i: usize, late_ns: u64| {
         let next = answer.get(i + 1).copied().unwrap_or(answer[i]);

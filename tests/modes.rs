@@ -1,4 +1,4 @@
-//! Stands with several modes, against a row of three inertias on springs that shares no code with the solver.
+//! Stands with several modes, against a chain of three inertias on springs, independent of the solver.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
@@ -10,16 +10,16 @@ use crate::util::{Folder, SIMULATE, assert_close, column, table};
 
 pub const RATE_HZ: f64 = 20_000.0;
 pub const COUNT: usize = 8000;
-/// Samples over which the torque acts.
+/// Number of samples over which the torque acts.
 const ACTS: usize = 6000;
-/// Samples at either end that depend on what was before the record or comes behind it.
+/// Number of samples at either end that depend on the extension beyond the record.
 const ENDS: usize = 1500;
 /// `√(K/J)` of one of the equal inertias and springs, in rad/s.
 const OMEGA: f64 = TAU * 400.0;
 /// Each spring has a damper of `β K`.
 const BETA_S: f64 = 2e-5;
 
-/// Angle from one inertia of the row to the next in mode `k` from 0: a row held at one end and free at the other (Lord
+/// Angle between neighbouring inertias of the chain in mode `k` from 0: fixed at one end and free at the other (Lord
 /// Rayleigh, *The Theory of Sound* I (1894), 120): `φ_k(i) = sin(i α_k)`, `ω_k = 2 √(K/J) sin(α_k/2)`.
 fn turn(k: usize) -> f64 {
     (2 * k + 1) as f64 * PI / 7.0
@@ -29,7 +29,7 @@ pub fn omega(k: usize) -> f64 {
     2.0 * OMEGA * (0.5 * turn(k)).sin()
 }
 
-/// The stand file of the row, with the torque on one of its inertias (1 to 3) and the gage at the spring that holds it.
+/// The stand file of the chain, with the torque on one of its inertias (1 to 3) and the gage at the grounded spring.
 pub fn stand(load: usize) -> String {
     let mut text = "schema = \"torqcomp.stand/1\"\n".to_owned();
     for k in 0..3 {
@@ -46,7 +46,7 @@ pub fn stand(load: usize) -> String {
     text
 }
 
-/// Torque in N m: five tones, two of them near resonances, that begin and end smoothly.
+/// Torque in N m: five tones, two of them near resonances, that start and end smoothly.
 fn applied(time_s: f64) -> f64 {
     let tones = [
         (4.0, 90.0),
@@ -63,18 +63,18 @@ fn applied(time_s: f64) -> f64 {
     (PI * part).sin().powi(4) * sum
 }
 
-/// What the gage shows, `T_o = K θ₁`: all angles are times `K`, torques beside the gage `n(x, x')`. Runge's and Kutta's
-/// fourth-order rule.
+/// Gage signal, `T_o = K θ₁`: all angles are times `K`, with torques `n(x, x')` at the gage. Fourth-order Runge–Kutta
+/// method.
 fn row(load: usize, beside: impl Fn(f64, f64) -> f64) -> Vec<f64> {
     row_in_steps(10, load, beside)
 }
 
-/// The same with so many steps from sample to sample.
+/// The same with a number of steps per sample.
 fn row_in_steps(fine: usize, load: usize, beside: impl Fn(f64, f64) -> f64) -> Vec<f64> {
     row_under(applied, (fine, load), beside)
 }
 
-/// The same under another torque over the time.
+/// The same under another torque over time.
 pub fn row_under(
     applied: impl Fn(f64) -> f64,
     (fine, load): (usize, usize),
@@ -119,25 +119,25 @@ pub fn row_under(
     shown
 }
 
-/// `T_o/T` of the row at a frequency, by elimination.
+/// `T_o/T` of the chain at a frequency, by elimination.
 fn response(load: usize, frequency_hz: f64) -> Complex64 {
     let s = Complex64::new(0.0, TAU * frequency_hz);
     let spring = 1.0 + BETA_S * s;
     let inertia = s * s / (OMEGA * OMEGA);
-    // Angles times K, for 1 of the last: from the free end to the held one.
+    // Angles times K, for 1 of the last: from the free end to the fixed one.
     let third = Complex64::ONE;
     let unloaded = |above: Complex64, here: Complex64| {
         here + (inertia * here + spring * (here - above)) / spring
     };
     match load {
-        // Below the load the row turns freely: θ₃ = 1, θ₂ from its inertia, and θ₁ from that of θ₂.
+        // Beyond the load the chain is free: θ₃ = 1, θ₂ from its inertia, and θ₁ from that of θ₂.
         1 => {
             let second = third * (inertia + spring) / spring;
             let first = unloaded(third, second);
             first / (inertia * first + spring * first + spring * (first - second))
         }
         _ => {
-            // The held end: θ₁ = 1, and outwards to the load.
+            // The fixed end: θ₁ = 1, and outwards to the load.
             let first = Complex64::ONE;
             let second = unloaded(Complex64::ZERO, first);
             let last = unloaded(first, second);
@@ -158,7 +158,7 @@ fn folder(load: usize, effects: &str, measured: &[f64]) -> Folder {
     folder
 }
 
-/// The table of `stand.toml` from one frequency to another in steps.
+/// The table of `stand.toml` over a frequency range.
 fn table_of([from, to, step]: [&str; 3]) -> [&str; 9] {
     let stand = "stand.toml";
     [
@@ -166,7 +166,7 @@ fn table_of([from, to, step]: [&str; 3]) -> [&str; 9] {
     ]
 }
 
-/// Rms of a difference over that of the whole, without the ends.
+/// RMS of a difference relative to that of the whole, without the ends.
 fn relative(got: &[f64], want: &[f64]) -> f64 {
     assert_eq!(got.len(), want.len());
     let inner = ENDS..want.len() - ENDS;
@@ -174,7 +174,8 @@ fn relative(got: &[f64], want: &[f64]) -> f64 {
     (left / inner.map(|i| want[i].powi(2)).sum::<f64>()).sqrt()
 }
 
-/// What `simulate` makes of the applied torque, and `compensate` of the record; each with its relative error.
+/// Output of `simulate` for the applied torque, and of `compensate` for the record; each with its relative
+/// error.
 fn both_ways(folder: &Folder, measured: &[f64], more: &[&str]) -> [f64; 2] {
     let simulate = [&SIMULATE[..], &["-o", "answer.csv", "--force"]].concat();
     folder.run(&simulate).says(0, &[]);
@@ -215,7 +216,7 @@ fn three_modes_are_simulated_and_taken_back() {
     }
 }
 
-/// A spring that stiffens and dry friction, both at the gage, with the torque on another inertia.
+/// A hardening spring and dry friction, both at the gage, with the torque on another inertia.
 #[test]
 fn torques_at_the_gage_push_every_mode() {
     let effects = "[[effects]]\nkind = \"cubic-stiffness\"\nform = \"beside\"\ncoefficient = \"2e-4 N m/(N m)^3\"\n\
@@ -230,12 +231,12 @@ fn torques_at_the_gage_push_every_mode() {
         let [forwards, backwards] = both_ways(&folder, &measured, &[]);
         println!("load {load}: {forwards:e} {backwards:e} of {plain:e}");
         assert!(forwards < 1e-4, "{load}: {forwards:e}");
-        // Harmonics beyond the band are left out; where load and gage are apart, H falls with the sixth power there.
+        // Harmonics beyond the band are excluded; where load and gage are apart, H falls with the sixth power there.
         assert!(backwards < 2e-2, "{load}: {backwards:e}");
     }
 }
 
-/// Sharp dry friction against the limit of the smooth one, which the oracle can take.
+/// Sharp dry friction against the limit of the smooth one, which the reference can integrate.
 #[test]
 fn sharp_friction_holds_the_gage_while_other_parts_move() {
     let effect =
@@ -266,7 +267,8 @@ fn a_table_is_that_of_the_row() {
     }
 }
 
-/// Of two modes and what they leave, `∂ ln H⁻¹/∂r₁ = (1 − H₁)/H`: what a residue gains is lost above the band.
+/// For two modes and a remainder, `∂ ln H⁻¹/∂r₁ = (1 − H₁)/H`: a residue gains what the modes above the band
+/// lose.
 #[test]
 fn an_uncertain_residue_is_propagated() {
     let folder = Folder::new();
@@ -344,7 +346,7 @@ fn what_several_modes_cannot_do_is_said() {
     folder.run(&args).says(1, &["acceleration", "harmonics"]);
 }
 
-/// Periods of tones every 2.5 Hz through the row, with noise, and the modes that `identify response` makes of them.
+/// Periods of tones every 2.5 Hz through the chain, with noise, and the modes found by `identify response`.
 #[test]
 fn modes_of_a_response_are_written_and_used() {
     const PERIOD: usize = 8000;
@@ -493,7 +495,7 @@ fn a_decay_tells_modes_but_not_their_residues() {
             "identify response",
         ],
     );
-    // With residues of its own the file keeps them, by frequency.
+    // A file with its own residues keeps them, by frequency.
     let mode = |hz: u32, residue: f64| {
         format!(
             "[[modes]]\nnatural_frequency = \"{hz} Hz\"\ndamping_ratio = 0.5\nresidue = {residue}\n"
@@ -513,7 +515,8 @@ fn a_decay_tells_modes_but_not_their_residues() {
     folder.run(&table).says(0, &[]);
 }
 
-/// One mode whose acceleration is recorded: the second derivative of the displacement, in every verb that takes it.
+/// One mode with recorded acceleration: the second derivative of the displacement, in every command that accepts
+/// it.
 #[test]
 fn a_record_of_acceleration_is_the_second_derivative() {
     let folder = Folder::new();

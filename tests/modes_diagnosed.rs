@@ -1,4 +1,4 @@
-//! The diagnosis of stands with several modes, on records of a row of three inertias that shares no code with the solver.
+//! Diagnosis of stands with several modes, on records of a chain of three inertias, independent of the solver.
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -13,10 +13,11 @@ use crate::util::{Folder, assert_close, column};
 /// Noise on the record, in N m.
 const NOISE_N_M: f64 = 0.01;
 
-/// Time until which a constant torque holds what rings from then on: long enough to come to rest.
+/// Time until which a constant torque holds the chain before its release: long enough to come to
+/// rest.
 const HELD_S: f64 = 0.3;
 
-/// Tones every 22.5 Hz up to 900 Hz, with phases of their own.
+/// Tones every 22.5 Hz up to 900 Hz, with individual phases.
 fn tones(seed: u64, size: f64) -> impl Fn(f64) -> f64 {
     let mut random = Noise(seed);
     let phases: Vec<f64> = (0..40).map(|_| TAU * random.uniform()).collect();
@@ -27,8 +28,8 @@ fn tones(seed: u64, size: f64) -> impl Fn(f64) -> f64 {
     }
 }
 
-/// A training and a held-out record of the row with a torque beside the gage, and its stand file with frequencies that are up to
-/// 2 % wrong. The load is on one of its inertias (1 to 3).
+/// A training and a held-out record of the chain with a torque at the gage, and its stand file with frequencies up to 2
+/// % wrong. The load is on one of its inertias (1 to 3).
 fn bench(load: usize, beside: impl Fn(f64, f64) -> f64) -> Folder {
     let folder = Folder::new();
     let mut text = stand(load);
@@ -76,8 +77,8 @@ fn constant(report: &Value, mode: usize, name: &str) -> [f64; 2] {
     ["after", "after_std"].map(|key| found[key].as_f64().unwrap())
 }
 
-/// Checks the frequencies of all modes and the error on the held-out record. The integration may err by as much as the noise
-/// leaves uncertain.
+/// Checks the frequencies of all modes and the hold-out error. The integration error may equal the uncertainty due to
+/// noise.
 fn check_stand(report: &Value) {
     for k in 0..3 {
         let [hz, std] = constant(report, k + 1, "natural_frequency");
@@ -106,7 +107,7 @@ fn nothing_is_missing_beside_three_modes() {
     }
 }
 
-/// A spring that stiffens beside the gage. The refined stand answers a torque that it has not seen.
+/// A hardening spring at the gage. The refined stand responds to an unseen torque.
 #[test]
 fn a_spring_that_stiffens_beside_three_modes() {
     for load in [1, 3] {
@@ -153,8 +154,8 @@ fn dry_friction_beside_three_modes() {
     print_errors(&report);
 }
 
-/// Residues of both signs do not tell how far a torque at the gage moves it: what is not looked for is said, what comes behind
-/// the stand is found.
+/// Residues of mixed signs do not determine how far a torque at the gage moves it: untested effects are reported, those
+/// after the stand are found.
 #[test]
 fn without_shapes_only_the_chain_is_looked_at() {
     let folder = bench(3, |_, _| 0.0);
@@ -196,8 +197,8 @@ fn without_shapes_only_the_chain_is_looked_at() {
     check_stand(&report);
 }
 
-/// Free ringing of all three modes after their holder was let go: frequencies that are up to 2 % wrong are found. What a spring that
-/// bends does to modes whose start is not known each is not looked for, and not called noise.
+/// Free decay of all three modes after release: frequencies up to 2 % wrong are found. The effect of a nonlinear spring
+/// on modes with unknown initial states is not searched for, and not called noise.
 #[test]
 fn free_ringing_of_three_modes() {
     for (cubic, verdict) in [(0.0, "nothing-missing"), (0.004, "unexplained")] {
@@ -248,8 +249,8 @@ fn free_ringing_of_three_modes() {
     }
 }
 
-/// The acceleration of one mode under tones, by its response over frequency: the frequency that was 2 % wrong is found, and the
-/// refined file says what is recorded.
+/// The acceleration of one mode under tones, by its frequency response: the frequency that was 2 % wrong is found, and
+/// the refined file gives the recorded quantity.
 #[test]
 fn an_acceleration_is_diagnosed_as_one() {
     let folder = Folder::new();
@@ -299,7 +300,7 @@ fn an_acceleration_is_diagnosed_as_one() {
     );
 }
 
-/// The number behind a key of a mode's table.
+/// The number after a key in a mode's table.
 fn number(table: &str, key: &str) -> f64 {
     let line = table.lines().find_map(|line| line.strip_prefix(key));
     line.unwrap().parse().unwrap()

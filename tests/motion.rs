@@ -1,6 +1,6 @@
-//! Motion for tests, integrated by Runge and Kutta's method.
+//! Motion for tests, integrated by the Runge–Kutta method.
 
-/// Displacement and speed a step of `h` later; `slope` gives the rates of both at a time.
+/// Displacement and speed after a step of `h`; `slope` gives the derivatives of both at a time.
 pub fn step(
     state: [f64; 2],
     t: f64,

@@ -1,14 +1,14 @@
-//! Every verb on damaged recordings, stand files and arguments: whatever they are, a run ends by itself, with a code of its
-//! own, within bounds of time and memory, and leaves neither a piece of a file nor a number that is none.
+//! Every command on damaged recordings, stand files and arguments: a run always terminates with a code of its own,
+//! within limits of time and memory, and leaves neither a partial file nor a non-finite number.
 //!
-//! The seeds are the commands of the golden outputs. Short by default; for any time, with other damage on every run unless
-//! the seed of the damage is given too:
+//! The seeds are the commands of the golden outputs. Short by default; for any duration, with different damage on every
+//! run unless the seed of the damage is given too:
 //!
 //! ```text
 //! TORQCOMP_MUTATION_SECONDS=3600 cargo test --test tests mutations -- --nocapture
 //! ```
 //!
-//! A finding is printed with its command, and its files are kept in a folder that is named.
+//! A finding is printed with its command, and its files are kept in a named folder.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,12 +18,12 @@ use std::time::{Duration, Instant};
 use crate::golden::{commands, workplace};
 use crate::noise::Noise;
 
-/// Longest time of a run of mutated files of at most some 100 kB.
+/// Maximum duration of a run with mutated files of at most some 100 kB.
 const LONGEST: Duration = Duration::from_secs(60);
-/// Memory that a run may ask for, in KiB.
+/// Memory limit of a run, in KiB.
 #[cfg(target_os = "linux")]
 const MEMORY_KIB: u32 = 2_000_000;
-/// Cells and values that programs stumble over.
+/// Cells and values that are troublesome for programs.
 const ODD: [&str; 24] = [
     "",
     "0",
@@ -51,7 +51,7 @@ const ODD: [&str; 24] = [
     "1_000",
 ];
 
-/// A whole number of the environment.
+/// An integer from the environment.
 fn number_of(variable: &str) -> Option<u64> {
     let text = std::env::var(variable).ok()?;
     Some(
@@ -72,7 +72,7 @@ impl Chance {
     }
 }
 
-/// Bytes flipped, overwritten, left out, put in twice, or cut off.
+/// Bytes flipped, overwritten, removed, duplicated, or truncated.
 fn damage_bytes(bytes: &mut Vec<u8>, chance: &mut Chance) {
     if bytes.is_empty() {
         return;
@@ -89,7 +89,7 @@ fn damage_bytes(bytes: &mut Vec<u8>, chance: &mut Chance) {
             bytes.splice(to..to, piece);
         }
         4 => {
-            // Lengths and times of messages are numbers of eight bytes.
+            // Lengths and times of messages are eight-byte numbers.
             let number = *chance.one(&[0, 1, u64::MAX, 1 << 32, 1 << 40, i64::MAX as u64]);
             let end = (at + 8).min(bytes.len());
             bytes[at..end].copy_from_slice(&number.to_le_bytes()[..end - at]);
@@ -98,13 +98,13 @@ fn damage_bytes(bytes: &mut Vec<u8>, chance: &mut Chance) {
     }
 }
 
-/// A line left out, repeated, moved or cut, a cell replaced, or the separator changed.
+/// A line removed, repeated, moved or truncated, a cell replaced, or the separator changed.
 fn damage_lines(text: &str, chance: &mut Chance) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     if lines.is_empty() {
         return (*chance.one(&ODD)).to_owned();
     }
-    // Heads are short, and matter as much as rows.
+    // Headers are short, and matter as much as rows.
     let at = match chance.below(2) {
         0 => chance.below(lines.len().min(5)),
         _ => chance.below(lines.len()),
@@ -162,7 +162,7 @@ fn damage_file(bytes: Vec<u8>, chance: &mut Chance) -> Vec<u8> {
     bytes
 }
 
-/// An argument left out, repeated, or replaced by an odd value.
+/// An argument removed, repeated, or replaced by an odd value.
 fn damage_arguments(words: &mut Vec<String>, chance: &mut Chance) {
     let at = 1 + chance.below(words.len() - 1);
     match chance.below(4) {
@@ -176,7 +176,7 @@ fn damage_arguments(words: &mut Vec<String>, chance: &mut Chance) {
     }
 }
 
-/// A command with something of it damaged, ready to run in a folder.
+/// A command with some part of it damaged, ready to run in a folder.
 fn mutated(command: &[String], folder: &Path, chance: &mut Chance) -> Vec<String> {
     let is_file = |word: &String| workplace().join(word).is_file();
     let files: Vec<usize> = (1..command.len())
@@ -208,7 +208,7 @@ fn mutated(command: &[String], folder: &Path, chance: &mut Chance) -> Vec<String
     words
 }
 
-/// What is wrong with a run, if anything.
+/// The problem of a run, if any.
 fn finding(words: &[String], folder: &Path) -> Option<String> {
     let mut child = bounded(words, folder);
     let start = Instant::now();
@@ -257,8 +257,8 @@ fn finding(words: &[String], folder: &Path) -> Option<String> {
     }
 }
 
-/// Whether a cell of a table or a value of a document is no finite number where one stands. The headings of a table of
-/// results are names: a channel may be called `inf`, and so may a file in a text of a JSON document.
+/// Whether a cell of a table or a value of a document is not a finite number where one is expected. The headings of a
+/// table of results are names: a channel may be called `inf`, and so may a file in a text of a JSON document.
 fn has_no_number(text: &str) -> bool {
     let is_json = text.starts_with('{');
     let is_odd = |cell: &str| {
@@ -296,7 +296,8 @@ fn bounded(words: &[String], folder: &Path) -> std::process::Child {
         .expect("the binary starts")
 }
 
-/// Runs mutated commands until a number of runs or a moment is reached; tells the runs and the findings.
+/// Runs mutated commands until a number of runs or a moment is reached; returns the number of runs and
+/// the findings.
 fn hunt(seeds: &[Vec<String>], seed: u64, (most, end): (usize, Instant)) -> (usize, Vec<String>) {
     let mut chance = Chance(Noise(seed));
     let mut found = Vec::new();
@@ -344,13 +345,13 @@ fn a_number_that_is_none_is_seen() {
     }
 }
 
-/// Every four bytes of the records of a summary, taken for the length of a text of 4 GiB.
+/// Every four bytes of the records of a summary, replaced by a text length of 4 GiB.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_length_that_a_summary_claims_takes_no_memory() {
     let whole = fs::read(workplace().join("made/ros2.mcap")).expect("a recording");
     let end = whole.len() - mcap::MAGIC.len();
-    // The end record: opcode and length, then where the summary begins.
+    // The end record: opcode and length, then the offset of the summary.
     let footer = &whole[end - 20..end];
     let start = u64::from_le_bytes(footer[..8].try_into().expect("eight bytes")) as usize;
     assert!(start > 0 && start < end, "no summary");

@@ -1,4 +1,4 @@
-//! Names of files that are no UTF-8, in every verb, for inputs and outputs.
+//! Non-UTF-8 file names, in every command, for inputs and outputs.
 
 use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::OsStrExt;
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::util::{Folder, Ran, command, sampled};
 
-/// A name in which `@` stands for "Messung ä" in Latin-1.
+/// A name with `@` replaced by "Messung ä" in Latin-1.
 fn name(text: &str) -> OsString {
     let parts: Vec<&[u8]> = text.as_bytes().split(|byte| *byte == b'@').collect();
     OsStr::from_bytes(&parts.join(b"Messung \xe4".as_slice())).to_owned()
@@ -47,7 +47,7 @@ fn rows(count: usize) -> String {
     })
 }
 
-/// A folder with a record and a stand file, each under a plain name and one that is no UTF-8.
+/// A folder with a record and a stand file, each under a plain name and a non-UTF-8 one.
 fn folder() -> Folder {
     let folder = Folder::new();
     folder.write("plain.csv", rows(4000));
@@ -154,7 +154,7 @@ fn every_verb_reads_and_writes_names_that_are_no_utf8() {
 fn what_identifies_and_diagnoses_reads_and_writes_names_that_are_no_utf8() {
     let folder = Folder::new();
     let here = folder.path(".");
-    // A free decay of a mode at 40 Hz with 2 % of damping.
+    // A free decay of a mode at 40 Hz with 2 % damping.
     let decay = sampled("torque [N m]", 2000.0, 4000, |i| {
         let t = i as f64 / 2000.0;
         (-0.02 * 251.3 * t).exp() * (251.2 * t).cos()
@@ -186,7 +186,8 @@ fn what_identifies_and_diagnoses_reads_and_writes_names_that_are_no_utf8() {
     }
 }
 
-/// All results of a tree with such names, by a folder, a pattern and a list, go on where a run before ended.
+/// All results of a tree with such names, by a folder, a pattern and a list, resume where a previous run
+/// ended.
 #[test]
 fn many_recordings_may_have_names_that_are_no_utf8() {
     let folder = folder();
@@ -258,7 +259,7 @@ fn many_recordings_may_have_names_that_are_no_utf8() {
             "{out}: {}",
             ran.stderr
         );
-        // What changed is made again, in the place of the old result.
+        // Changed recordings are processed again, replacing the old result.
         std::fs::write(
             logs.join(named("2.csv")),
             rows(3600 + usize::from(out.as_bytes()[out.len() - 1])),
@@ -278,7 +279,7 @@ fn many_recordings_may_have_names_that_are_no_utf8() {
     );
     let merged = done(&folder, &["merge", "out@1", "-o", "@.merged.csv"]);
     assert!(merged.stderr.contains('3'), "{}", merged.stderr);
-    // A result in the place of a recording is refused.
+    // A result that would replace a recording is rejected.
     let ran = run(
         &folder,
         &[

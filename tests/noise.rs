@@ -1,12 +1,12 @@
-//! Noise that is the same on every run.
+//! Reproducible noise.
 
 use std::f64::consts::TAU;
 
-/// A state that is not zero.
+/// A nonzero state.
 pub struct Noise(pub u64);
 
 impl Noise {
-    /// Even, between 0 and 1.
+    /// Uniform between 0 and 1.
     pub fn uniform(&mut self) -> f64 {
         // xorshift64*, S. Vigna.
         self.0 ^= self.0 >> 12;

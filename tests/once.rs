@@ -1,13 +1,14 @@
-//! The stand's response is divided out once: results of `compensate` are marked, refused by `compensate`, and taken
-//! as they are by `harmonics`.
+//! The stand's response is divided out only once: results of `compensate` are marked, rejected by `compensate`, and
+//! used unchanged by `harmonics`.
 
 use crate::noise::Noise;
 use crate::util::{Folder, assert_close, record, steady};
 
-/// 0.30 N m at 590 Hz, where the stand of the thesis shows 7 times as much.
+/// 0.30 N m at 590 Hz, where the stand of the thesis amplifies 7 times.
 const PARTS: [(f64, f64, f64); 2] = [(0.5, 0.0, 0.0), (0.30, 590.0, 0.4)];
 
-/// Orders of 100 Hz in a record with noise: those above the band of the compensation are said to be filtered, and no others.
+/// Orders of 100 Hz in a record with noise: those above the band of the compensation are reported as filtered, and no
+/// others.
 #[test]
 fn orders_above_the_band_of_a_compensated_record_are_said() {
     let parts: Vec<(f64, f64, f64)> = (1..=9).map(|n| (0.3, 100.0 * f64::from(n), 0.4)).collect();
@@ -64,14 +65,14 @@ fn harmonics_of_a_compensated_record_are_the_torque_without_a_stand() {
         let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
         let first = &report["components"][0];
         let number = |key: &str| first[key].as_f64().unwrap();
-        // The ends of the record depend on its continuation: 34 ms of 1 s.
+        // The ends of the record depend on its extension: 34 ms of 1 s.
         assert_close(number("torque"), 0.30, 5e-3);
         assert_eq!(number("factor"), 1.0);
         assert_eq!(number("recorded"), number("torque"));
         assert_eq!(report["taken_as"], "compensated");
         assert!(report["stand"].is_null() && first["std_stand"].is_null());
     }
-    // The same with the stand divided out here, and the text says which of both was done.
+    // The same with the stand divided out here, with a text that says which was done.
     let direct = folder.run(&[
         "harmonics",
         "in.csv",
@@ -125,7 +126,7 @@ fn a_compensated_record_is_not_compensated_again() {
         );
         assert!(again.stdout.is_empty());
     }
-    // Another column of the same file is another matter.
+    // Another column of the same file is independent.
     let both = [
         "compensate",
         "in.csv",
@@ -159,7 +160,7 @@ fn a_recorded_channel_needs_the_stand() {
     ran.says(2, &["\"bridge\" is taken as recorded", "--stand FILE"]);
 }
 
-/// No stand is identified or diagnosed from a torque in which its response is no longer.
+/// No stand is identified or diagnosed from a torque without its response.
 #[test]
 fn a_compensated_record_is_no_answer_of_a_stand() {
     let folder = Folder::new();

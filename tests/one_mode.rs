@@ -1,4 +1,4 @@
-//! Records of a stand of one mode with any torque beside it.
+//! Records of a stand with one mode and an arbitrary additional torque.
 
 use std::f64::consts::TAU;
 
@@ -9,13 +9,13 @@ pub const NATURAL_HZ: f64 = 20.0;
 pub const DAMPING_RATIO: f64 = 0.05;
 pub const RATE_HZ: f64 = 800.0;
 pub const SAMPLES: usize = 6_000;
-/// Steps of the integration from sample to sample.
+/// Integration steps per sample.
 const STEPS: usize = 16;
-/// Noise over the rms of the record.
+/// Noise relative to the RMS of the record.
 const NOISE: f64 = 0.003;
 
-/// Applied and recorded torque of a stand with a torque in N m over time, displacement and speed divided by `ω`, beside a spring
-/// of 1, under forty sines; and the rms of the noise.
+/// Applied and recorded torque of a stand with a torque in N m, a function of time, displacement and speed divided by
+/// `ω`, in addition to a spring of 1, under forty sines; and the RMS of the noise.
 pub fn record(
     law: impl Fn(f64, f64, f64) -> f64,
     (level, to_hz): (f64, f64),

@@ -1,4 +1,4 @@
-//! Outputs appear whole or not at all.
+//! Outputs are complete or absent.
 
 use std::io::Read;
 use std::process::Stdio;
@@ -183,7 +183,7 @@ fn an_interrupted_run_leaves_nothing() {
     .expect("the binary starts");
     let mut pipe = child.stdin.take().expect("a pipe");
     std::io::Write::write_all(&mut pipe, folder.read("in.csv").as_bytes()).expect("rows");
-    // It waits for more rows, its temporary file being open.
+    // It waits for more rows with its temporary file open.
     let part = || folder.names().iter().any(|name| name.ends_with(".part"));
     for _ in 0..500 {
         if part() {
@@ -251,7 +251,7 @@ fn json_is_one_document_and_talk_goes_to_stderr() {
 #[test]
 fn strict_turns_a_warning_into_3() {
     let folder = Folder::new();
-    // Nothing but noise above 100 Hz.
+    // Only noise above 100 Hz.
     let mut noise = Noise(1);
     let noisy: Vec<f64> = (0..60_000)
         .map(|i| (f64::from(i) * 0.01).sin() + 0.01 * (noise.uniform() - 0.5))
@@ -265,7 +265,7 @@ fn strict_turns_a_warning_into_3() {
     folder.run(&args).says(0, &["band-lost-in-noise", "--band"]);
     let strict = [&args[..], &["--strict"]].concat();
     folder.run(&strict).says(3, &["band-lost-in-noise"]);
-    // The same record with the band that is chosen for it has nothing to warn of.
+    // The same record with its automatic band causes no warning.
     let chosen = [&COMPENSATE[..], &["-o", "out.csv", "--force", "--strict"]].concat();
     assert_eq!(folder.run(&chosen).code, 0);
 }
@@ -354,7 +354,8 @@ fn a_link_to_nothing_stays_one() {
     assert_eq!(folder.read("sub/new.csv").lines().count(), 60_001);
 }
 
-/// The plot cannot take its name, since a folder comes to be there during the run: the table must not appear either.
+/// The plot cannot be renamed, since a folder of that name is created during the run: the table must not appear
+/// either.
 #[cfg(unix)]
 #[test]
 fn two_outputs_appear_both_or_neither() {
@@ -448,7 +449,7 @@ fn what_a_killed_run_left_is_removed_by_the_next() {
     };
     let (mut killed, killed_pipe) = start();
     wait(1);
-    // Another run that goes on keeps its own.
+    // Another run that is still alive keeps its own.
     let (mut alive, alive_pipe) = start();
     wait(2);
     killed.kill().unwrap();
@@ -474,7 +475,7 @@ fn is_ignored(signal: i32) -> bool {
     mask >> (signal - 1) & 1 == 1
 }
 
-/// Every signal that can be caught leaves nothing; those that are ignored, as by `nohup`, stay so.
+/// No signal that can be caught leaves files behind; ignored ones, as by `nohup`, remain ignored.
 #[cfg(target_os = "linux")]
 #[test]
 fn signals_leave_nothing_or_are_ignored() {
@@ -486,7 +487,7 @@ fn signals_leave_nothing_or_are_ignored() {
         ("INT", 2),
     ] {
         for ignored in [false, true] {
-            // A shell's background job, or nohup, hands down signals that are ignored.
+            // A shell's background job, or nohup, passes on ignored signals.
             if !ignored && is_ignored(number) {
                 continue;
             }
@@ -527,7 +528,7 @@ fn signals_leave_nothing_or_are_ignored() {
     }
 }
 
-/// `ulimit -f` ends writing with a signal unless that is handled.
+/// `ulimit -f` kills a writer by a signal unless that is handled.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_limit_of_file_sizes_leaves_nothing() {
@@ -549,14 +550,14 @@ fn a_limit_of_file_sizes_leaves_nothing() {
 #[test]
 fn an_impossible_output_of_identify_is_refused_before_the_work() {
     let folder = folder();
-    // The record could not be read either: the output is looked at first.
+    // The record could not be read either: the output is checked first.
     let args = ["identify", "decay", "none.csv", "-o", "none/stand.toml"];
     folder
         .run(&args)
         .says(1, &["the folder none does not exist"]);
 }
 
-/// `--strict` fails for a warning unless its code is allowed; a code that no warning has is wrong usage.
+/// `--strict` fails on a warning unless its code is allowed; an unknown code is a usage error.
 #[test]
 fn strict_lets_allowed_warnings_pass() {
     let folder = Folder::new();

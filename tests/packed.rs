@@ -1,4 +1,5 @@
-//! Compressed recordings: what is in them is read as if it were not compressed, by every verb and from a pipe, and damage is told.
+//! Compressed recordings: their content is read as if uncompressed, by every command and from a pipe, and damage is
+//! reported.
 
 use std::fs;
 
@@ -7,7 +8,7 @@ use serde_json::Value;
 use crate::golden::workplace;
 use crate::util::{COMPENSATE, Folder, record, steady};
 
-/// A gzip file of stored blocks (RFC 1951, 3.2.4; RFC 1952), written without any code of the reader.
+/// A gzip file of stored blocks (RFC 1951, 3.2.4; RFC 1952), written independently of the reader.
 fn stored(content: &[u8]) -> Vec<u8> {
     let mut file = vec![0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 255];
     let mut blocks = content.chunks(60_000).peekable();
@@ -62,7 +63,7 @@ fn a_packed_text_gives_the_bytes_of_the_text() {
         (stored(text().as_bytes()), "gzip"),
         (raw(text().as_bytes()), "zstd"),
     ] {
-        // The name says nothing.
+        // The name is irrelevant.
         folder.write("in.csv", &packed);
         let ran = folder.run(&[&COMPENSATE[..], &["--force"]].concat());
         ran.says(
@@ -73,7 +74,7 @@ fn a_packed_text_gives_the_bytes_of_the_text() {
         let words = ["compensate", "-", "--stand", "stand.toml"];
         let piped = folder.pipe(&words, &packed);
         assert!(piped.stdout == wanted, "{name}: {}", piped.stderr);
-        // Two members one after the other are one file.
+        // Two consecutive members are one file.
         let text = text();
         let half = text.len() / 2;
         let parts = [&text.as_bytes()[..half], &text.as_bytes()[half..]];
@@ -110,7 +111,7 @@ fn packed_messages_are_read_by_every_way_to_them() {
         assert_eq!(found.stdout, rows.stdout, "{}", found.stderr);
         let piped = folder.pipe(&[&["extract", "-"], &signal[..]].concat(), &packed);
         assert_eq!(piped.stdout, rows.stdout, "{}", piped.stderr);
-        // In another case, for which the file is gone through first.
+        // In another case, which requires a first pass over the file.
         let other = ["--signal", "/JOINT_STATES.EFFORT[0]"];
         let [of_plain, of_packed] =
             ["a.mcap", "packed"].map(|name| folder.run(&[&["extract", name], &other[..]].concat()));
@@ -141,7 +142,7 @@ fn damage_is_told_and_leaves_nothing() {
             assert_eq!(folder.names(), ["in.csv", "stand.toml"]);
         }
     }
-    // A bit of the content is wrong: the sum at the end says so.
+    // A wrong bit of the content is detected by the checksum at the end.
     let mut packed = stored(text.as_bytes());
     let at = packed.len() / 2;
     let digit = packed[at..]

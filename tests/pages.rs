@@ -1,4 +1,4 @@
-//! What an installed program brings along: its version, manual pages and completions.
+//! Files of an installed program: its version, manual pages and completions.
 
 use crate::util::Folder;
 
@@ -34,7 +34,7 @@ fn manual_pages_go_to_standard_output_a_file_or_all_into_a_folder() {
     assert_eq!(read("torqcomp"), program.stdout);
     assert_eq!(read("torqcomp-identify-decay"), folder.read("decay.1"));
     let pages = std::fs::read_dir(folder.path("man")).expect("a folder");
-    // The program, its verbs, and the tests of `identify`.
+    // The program, its commands, and the tests of `identify`.
     let verbs = folder.run(&["--help"]).stdout;
     let verbs = verbs.split_once("Commands:\n").expect("verbs").1;
     let listed = verbs.lines().take_while(|line| !line.is_empty());

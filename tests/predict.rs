@@ -1,4 +1,4 @@
-//! `predict` on the stand of the thesis: the residuals and what explains them.
+//! `predict` on the stand of the thesis: the residuals and their explanations.
 
 use serde_json::Value;
 
@@ -120,9 +120,9 @@ fn a_stand_without_a_drawing_is_told_what_to_add() {
         .says(1, &["[beam]", "[[parts]]"]);
 }
 
-/// A calibration in another signal stands beside what the drawing gives for that signal. One strain at the gage is
-/// `E b d² R/(6 (L − x))` = 44,444 N m, so 500 µε, 1 mV/V of a full bridge of gage factor 2, is 22.2222 N m; with 10 V of supply and
-/// a gain of 100 that is 1 V. The data sheet says 25 N m per mV/V: the prediction is 11.1 % below.
+/// A calibration in another signal is compared with the drawing for that signal. The torque per strain at the gage is
+/// `E b d² R/(6 (L − x))` = 44,444 N m, so 500 µε, 1 mV/V of a full bridge of gage factor 2, is 22.2222 N m; with 10 V
+/// of supply and a gain of 100 that is 1 V. The data sheet says 25 N m per mV/V: the prediction is 11.1 % below.
 #[test]
 fn a_calibration_in_any_signal_stands_beside_the_drawing() {
     let drawing = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"590 Hz\"\ndamping_ratio = 0.02\n\
@@ -147,7 +147,7 @@ fn a_calibration_in_any_signal_stands_beside_the_drawing() {
     let volts = of(&found, "torque_per_volt");
     close(&volts["predicted"], 22.2222, 1e-3);
     close(&volts["measured"], 25.0, 1e-9);
-    // The drawing alone gives it too, without a supply as well.
+    // The drawing alone gives it too, even without a supply.
     for given in ["", "excitation = \"10 V\"\n"] {
         let folder = Folder::new();
         let bare = drawing.replace("excitation = \"10 V\"\n", given);

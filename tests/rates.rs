@@ -1,4 +1,4 @@
-//! Rates that stamps leave open, and gaps that a given rate passes over.
+//! Rates left open by stamps, and gaps ignored by a given rate.
 
 use crate::util::{COMPENSATE, Folder, HARMONICS, assert_close, column};
 
@@ -18,7 +18,8 @@ fn compensate(folder: &Folder, more: &[&str]) -> crate::util::Ran {
     folder.run(&[&COMPENSATE[..], &["--force"], more].concat())
 }
 
-/// 1 kHz for two seconds, the milliseconds dropped: two stamps, which any rate above 1999 samples in 3 s explains.
+/// 1 kHz for two seconds, with the milliseconds dropped: two stamps, which any rate above 1999 samples in 3 s
+/// explains.
 #[test]
 fn stamps_in_whole_seconds_do_not_give_a_rate_for_a_resonance() {
     let folder = Folder::new();
@@ -60,7 +61,8 @@ fn stamps_in_whole_seconds_do_not_give_a_rate_for_a_resonance() {
     );
 }
 
-/// 800 Hz in whole milliseconds: steps of 1 and 2 ms. Over 12.5 s they leave less than 0.01 % open.
+/// 800 Hz in whole milliseconds: steps of 1 and 2 ms. Over 12.5 s they determine the rate to better
+/// than 0.01 %.
 #[test]
 fn stamps_rounded_a_little_give_the_rate() {
     let folder = Folder::new();
@@ -75,7 +77,7 @@ fn stamps_rounded_a_little_give_the_rate() {
     );
 }
 
-/// Twenty samples are missing after 0.499 s: a given rate joins the ends, and says so.
+/// Twenty samples are missing after 0.499 s: a given rate joins the ends, and a warning says so.
 #[test]
 fn a_given_rate_does_not_hide_a_gap() {
     let folder = Folder::new();
@@ -117,7 +119,7 @@ fn a_given_rate_does_not_hide_a_gap() {
         "run backwards 1 time, first from 0.499 s to 0.25 s",
     ];
     compensate(&folder, &["--rate", "1000"]).says(0, &said);
-    // Uniform stamps, and stamps that are no times of samples, are nothing to speak of.
+    // Uniform stamps, and stamps that are not sample times, cause no warning.
     for stamp in [
         |i: usize| format!("{:.3}", 1e-3 * i as f64),
         |_: usize| "0.5".to_owned(),

@@ -1,8 +1,8 @@
-//! Every sample in `tests/recordings`, read through the binary, beside what `expected.toml` says it holds: channels, units,
-//! counts, rates, starts and sums.
+//! Every sample in `tests/recordings`, read through the binary, compared with `expected.toml`: channels, units, counts,
+//! rates, starts and sums.
 //!
-//! To add a dialect, put a file there and run `SNAPSHOTS=overwrite cargo test --test tests recordings`, then check
-//! the new entry against the file by hand. Options that a file needs stand in its entry as `options`.
+//! To add a dialect, put a file there and run `SNAPSHOTS=overwrite cargo test --test tests recordings`, then check the
+//! new entry against the file by hand. Options required for a file are in its entry as `options`.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use toml_edit::DocumentMut;
 use crate::golden::Ran;
 use crate::golden::settle::{readable, settle};
 
-/// What is expected of the samples.
+/// The expected content of the samples.
 const EXPECTED: &str = "expected.toml";
 
 /// The folder of the samples.
@@ -41,7 +41,7 @@ pub fn samples() -> Vec<String> {
     names
 }
 
-/// Options that a sample needs, as its entry says.
+/// Options required for a sample, from its entry.
 pub fn options(name: &str) -> Vec<String> {
     static TABLE: LazyLock<DocumentMut> = LazyLock::new(|| {
         let text = std::fs::read_to_string(folder().join(EXPECTED)).expect("expectations");
@@ -66,7 +66,7 @@ fn samples_hold_what_is_expected_of_them() {
     );
 }
 
-/// Results of a job for each sample, in their order.
+/// Results of a job for each sample, in order.
 pub fn in_parallel<T: Send>(samples: &[String], job: impl Fn(&str) -> T + Sync) -> Vec<T> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let part = &|names: &[String]| names.iter().map(|name| job(name)).collect::<Vec<T>>();
@@ -82,7 +82,7 @@ pub fn in_parallel<T: Send>(samples: &[String], job: impl Fn(&str) -> T + Sync) 
     })
 }
 
-/// What a sample holds, as an entry of `expected.toml`.
+/// Content of a sample, as an entry of `expected.toml`.
 fn entry(name: &str, options: &[String]) -> String {
     let mut text = format!("[{name:?}]\n");
     if !options.is_empty() {
@@ -137,7 +137,7 @@ fn entry(name: &str, options: &[String]) -> String {
     text
 }
 
-/// An array of texts, a line each, if there are any.
+/// An array of texts, one per line, if there are any.
 fn lines(text: &mut String, name: &str, items: &[Value], (left, right): (&str, &str)) {
     if items.is_empty() {
         return;
@@ -151,7 +151,7 @@ fn lines(text: &mut String, name: &str, items: &[Value], (left, right): (&str, &
     text.push_str("]\n");
 }
 
-/// What `inspect` says of a channel.
+/// Facts about a channel reported by `inspect`.
 fn facts(channel: &Value) -> String {
     let mut text = format!("name = {}", channel["name"]);
     for (key, field) in [
@@ -179,7 +179,7 @@ fn facts(channel: &Value) -> String {
     text
 }
 
-/// Count and sum of the values that `extract` gives, or why it gives none.
+/// Count and sum of the values output by `extract`, or why there are none.
 fn extracted(ran: &Ran) -> String {
     if !matches!(ran.code, 0 | 3) {
         return format!(", extract = {}", quoted(&ran.stderr));
@@ -207,7 +207,7 @@ fn list(value: &Value) -> &[Value] {
     value.as_array().map_or(&[], Vec::as_slice)
 }
 
-/// A text between quotes, as TOML has it.
+/// A quoted TOML text.
 fn quoted(text: &str) -> String {
     Value::from(text.trim()).to_string()
 }

@@ -1,5 +1,5 @@
-//! `compensate` with effects in the stand: what `simulate` made of a torque comes back, and on records of the
-//! independent generator the error of the torque falls as the error of the model does.
+//! `compensate` with effects in the stand: the input of `simulate` is recovered, and on records of the
+//! independent generator the error of the torque falls with the error of the model.
 
 use std::f64::consts::TAU;
 
@@ -14,7 +14,7 @@ use crate::blind::{catalogue, declared, plant};
 use crate::noise::Noise;
 use crate::util::{Folder, HERTEL, column, sampled};
 
-/// Samples of a record of the round trip.
+/// Number of samples of a record of the round trip.
 const COUNT: usize = 12_000;
 /// Band of the round trip in Hz.
 const BAND_HZ: f64 = 1500.0;
@@ -37,7 +37,7 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
-/// A stand file with one form of an effect, of a size as a fit would begin with.
+/// A stand file with one form of an effect, with the start values of a fit.
 fn stand(effect: &Effect, form: &Form) -> String {
     let scales = RecordScales {
         rms: 5.0,
@@ -51,7 +51,7 @@ fn stand(effect: &Effect, form: &Form) -> String {
     );
     let start = form.starts.first().copied().unwrap_or(&[43.7, 0.1, 0.05]);
     for (i, parameter) in form.parameters.iter().enumerate() {
-        // A line has an amplitude that the start leaves to the record.
+        // The amplitude of a line is left to the record by the start values.
         let value = match start.get(i) {
             Some(start) => parameter.value(*start, &scales),
             None => 0.3 / i as f64,
@@ -71,7 +71,7 @@ fn stand(effect: &Effect, form: &Form) -> String {
     text
 }
 
-/// Part of the torque, rms, by which it does not come back: the middle of the record, and its ends.
+/// Relative RMS error of the recovered torque: in the middle of the record, and at its ends.
 fn round_trip(effect: &Effect, form: &Form) -> (f64, f64, String) {
     let folder = Folder::new();
     folder.write("stand.toml", stand(effect, form));
@@ -117,7 +117,7 @@ fn round_trip(effect: &Effect, form: &Form) -> (f64, f64, String) {
     (error(COUNT / 10..COUNT - COUNT / 10), ends, ran.stdout)
 }
 
-/// The phases of lines are the record's: `simulate` leaves them out.
+/// The phases of lines belong to the record, so `simulate` omits them.
 fn add_lines(folder: &Folder, form: &Form) {
     use torqcomp_model::effects::Action;
     let start = form.starts.first().copied().unwrap_or(&[43.7, 0.1, 0.05]);
@@ -131,7 +131,7 @@ fn add_lines(folder: &Folder, form: &Form) {
                 .enumerate()
                 .map(|(k, l)| l.amplitude * (TAU * l.frequency_hz * time_s + 0.7 * k as f64).sin())
                 .sum(),
-            // Less its mean over 0.6 s: a course has none.
+            // Minus its mean over 0.6 s, as a trend has none.
             Action::Course(_) => (2.0 * time_s).sin() - 0.531_4,
             _ => 0.0,
         }
@@ -145,15 +145,15 @@ fn add_lines(folder: &Folder, form: &Form) {
     folder.write("record.csv", text);
 }
 
-/// What a form may leave of a torque: nothing is lost by most of them.
+/// Allowed error of a torque with a form: most of them lose nothing.
 fn allowed(effect: &str, form: &str) -> f64 {
     match (effect, form) {
-        // Cut off for good, at the scales of a fit.
+        // Clipped irrecoverably, at the scales of a fit.
         ("saturation", "hard" | "uneven") => 0.3,
         ("saturation", _) => 0.05,
         // Nothing is shown within the gap.
         ("backlash", "gap" | "recorded") => 0.1,
-        // The signal's own part at the line stays in.
+        // The signal's own component at the line remains.
         ("mains-pickup" | "rotor-imbalance", _) | ("thermal-drift", "course") => 0.03,
         _ => 0.01,
     }
@@ -181,8 +181,8 @@ fn what_simulate_made_comes_back() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// A record of the independent generator with an effect in it, as files: what the torque is off by with the best plain
-/// stand and with the truth in the stand file, and what noise makes of it.
+/// A record of the independent generator with an effect, as files: the torque error with the best plain stand, with
+/// the truth in the stand file, and due to noise.
 struct Recovered {
     plain: f64,
     refined: f64,
@@ -282,7 +282,8 @@ fn truth(
     })
 }
 
-/// Rms out over rms in of white noise through the inverse of the plain stand, in a band with half its edge.
+/// White-noise gain (output over input RMS) of the inverse of the plain stand, in a band with half its
+/// edge.
 fn noise_gain(plain: PlainConstants, top_hz: f64) -> f64 {
     let steps = 2000;
     let sum: f64 = (0..steps)
@@ -295,10 +296,10 @@ fn noise_gain(plain: PlainConstants, top_hz: f64) -> f64 {
     (sum / f64::from(steps) * 1.1 * top_hz / (0.5 * RATE_HZ)).sqrt()
 }
 
-/// Of the torque's error, over that of noise alone, what may be left with the truth in the stand file.
+/// Allowed ratio of the torque's error to that from noise alone, with the truth in the stand file.
 fn left(effect: &str) -> f64 {
     match effect {
-        // Through its inverse the noise of the recorder grows.
+        // Its inverse amplifies the noise of the recorder.
         "recorder-lowpass" | "capacitive-coupling" => 6.0,
         _ => 3.0,
     }
@@ -307,7 +308,8 @@ fn left(effect: &str) -> f64 {
 #[test]
 fn the_torque_improves_as_the_model_does() {
     let mut wrong = Vec::new();
-    // A record of each effect, and laws whose inverse is another: play of the gage, a soft range, AC coupling.
+    // A record of each effect, and laws with a different inverse: backlash of the gage, a soft range, AC
+    // coupling.
     let more = [
         ("backlash", 3),
         ("saturation", 5),

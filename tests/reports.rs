@@ -1,4 +1,4 @@
-//! Help, pages and plots: what a reader is given beside the numbers.
+//! Help, pages and plots: output for readers in addition to numbers.
 
 use std::process::Stdio;
 
@@ -37,7 +37,7 @@ fn compensate<'a>(more: &[&'a str]) -> Vec<&'a str> {
 fn a_picture_of_another_format_is_refused_by_name_before_the_work() {
     let folder = Folder::new();
     folder.write("run.csv", recorded(2000));
-    // There is no such stand: the picture is refused before it is looked for.
+    // There is no such stand: the picture is rejected before the stand is searched for.
     for verb in [
         &[
             "compensate",
@@ -180,7 +180,7 @@ fn a_compensation_has_its_page() {
     );
 }
 
-/// Peak of a line in a page's chart, in positions of its axes: logarithms on a logarithmic one.
+/// Peak of a line in a page's chart, in axis units: logarithms on a logarithmic axis.
 pub(crate) fn highest(page: &str, title: &str, series: usize) -> (f64, f64) {
     let figure = page.split("<figure>").find(|f| f.contains(title)).unwrap();
     let drawing = figure.split("data-axes=\"").nth(1).unwrap();
@@ -223,7 +223,7 @@ fn the_charts_of_a_compensation_show_what_was_computed() {
         .says(0, &[]);
     let page = folder.read("page.html");
     // A line of amplitude a in a Hann window of 4096 samples at 5 kHz has the mean square a²/2, and at its centre the
-    // density a²/2 / (1.5 Δf): 3 N m at 40 Hz, which lies 0.23 bins off (−0.08 dB of its power).
+    // density a²/2 / (1.5 Δf): 3 N m at 40 Hz, which is 0.23 bins off (−0.08 dB of its power).
     let (x, y) = highest(&page, "Amplitude spectral density", 1);
     let step_hz: f64 = 5000.0 / 4096.0;
     let density = (4.5 / (1.5 * step_hz)).sqrt();
@@ -237,7 +237,7 @@ fn the_charts_of_a_compensation_show_what_was_computed() {
         "{} {density}",
         10_f64.powf(y)
     );
-    // 1/|H| of the thesis' stand at 800 Hz is 0.9176, of a band that ends there the gain falls from then on.
+    // 1/|H| of the thesis' stand at 800 Hz is 0.9176; for a band that ends there the gain falls above it.
     let (x, gain) = highest(&page, "Torque per recorded torque", 0);
     let inverse = 1.0 / crate::util::hertel_response(x).0;
     assert!(
@@ -281,7 +281,7 @@ fn what_was_bridged_is_listed_and_marked_with_what_it_affects() {
             }
         }
     }
-    // The result differs from that of the whole record no farther than is marked.
+    // The result differs from that of the whole record only within the marked intervals.
     let report = folder.json(&compensate(&["--fill", "linear", "-o", "a.csv", "--json"]));
     folder.write("run.csv", recorded(5000));
     folder.run(&compensate(&["-o", "b.csv"])).says(0, &[]);
@@ -299,7 +299,7 @@ fn what_was_bridged_is_listed_and_marked_with_what_it_affects() {
     );
 }
 
-/// Labels of the axes of all charts in a picture or a page: texts in the middle below a panel, and above it.
+/// Axis labels of all charts in a picture or a page: centred texts below a panel, and above it.
 fn axis_labels(svg: &str) -> Vec<String> {
     let mut found = Vec::new();
     for text in svg.split("<text ").skip(1) {

@@ -1,5 +1,5 @@
-//! JSON Schemas: every document of the golden outputs, of a run over many recordings, of a merge and of a failure is one of
-//! the schema that it names, and no schema takes what its type does not have.
+//! JSON Schemas: every document of the golden outputs, of a batch run, of a merge and of a failure conforms to the
+//! schema that it names, and no schema accepts fields that its type does not have.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -45,7 +45,7 @@ impl Printed {
         printed
     }
 
-    /// What is wrong with a document.
+    /// The problem of a document, if any.
     pub fn fault(&self, document: &Value) -> Option<String> {
         let name = document["schema"].as_str().unwrap_or_default();
         let Some(index) = self.by_name.get(name) else {
@@ -56,7 +56,7 @@ impl Printed {
     }
 }
 
-/// The JSON documents in a text, each of which begins on a line of its own.
+/// The JSON documents in a text, each beginning on a separate line.
 fn documents(text: &str) -> Vec<Value> {
     let starts = text
         .match_indices("{\n  \"schema\": \"torqcomp.")
@@ -81,7 +81,7 @@ fn texts(folder: &Path, all: &mut Vec<PathBuf>) {
     }
 }
 
-/// The golden outputs are what the verbs print, as other tests see to.
+/// The golden outputs are those of the commands, as other tests ensure.
 #[test]
 fn every_golden_document_is_of_its_schema() {
     let printed = Printed::new();
@@ -180,7 +180,7 @@ fn a_schema_takes_nothing_else() {
     }));
 }
 
-/// What an object is described by, and every object within it.
+/// Checks that every object, including nested ones, is described.
 fn check_objects(schema: &Value, place: &str, is_part: bool) {
     let Some(keywords) = schema.as_object() else {
         return;

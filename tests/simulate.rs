@@ -1,4 +1,4 @@
-//! `simulate` and the course of an input between its samples, through the binary.
+//! `simulate` and the waveform of an input between samples, through the binary.
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -10,7 +10,7 @@ use crate::util::{Folder, SIMULATE, table};
 const RATE_HZ: f64 = 20_000.0;
 const STAND: &str = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"600 Hz\"\ndamping_ratio = 0.08\n";
 
-/// A sum of sines that repeats every 2000 samples.
+/// A sum of sines with a period of 2000 samples.
 fn input(seed: u32, count: usize) -> Vec<f64> {
     let line = |k: u32, i: usize| {
         let phase = f64::from(k * k * seed % 97);
@@ -21,7 +21,8 @@ fn input(seed: u32, count: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The stand's answer to held samples, exactly: from sample to sample it moves freely about the sample's own rest.
+/// Exact response of the stand to held samples: between samples it moves freely about the equilibrium of the
+/// sample.
 fn held(input: &[f64]) -> Vec<f64> {
     let (omega, zeta) = (TAU * 600.0, 0.08_f64);
     let (sigma, damped) = (zeta * omega, omega * (1.0 - zeta * zeta).sqrt());
@@ -71,8 +72,8 @@ fn held_samples_are_simulated_as_they_are() {
     assert!(relative < 1e-3, "{relative:e}");
 }
 
-/// One period of a sum of sines from phase 0 on: the steady answer has each line by the response of the stand, in closed
-/// form, from the first sample to the last.
+/// One period of a sum of sines starting at phase 0: in the steady-state response, each line has the closed-form
+/// response of the stand, from the first sample to the last.
 #[test]
 fn a_period_that_is_repeated_has_its_steady_answer() {
     let folder = Folder::new();
@@ -104,7 +105,7 @@ fn a_period_that_is_repeated_has_its_steady_answer() {
     }
 }
 
-/// A diagnosis of held inputs whose answers are recorded too large by a factor.
+/// Diagnosis of held inputs whose responses are recorded too large by a factor.
 fn diagnosed_as_held(factor: f64) -> serde_json::Value {
     let folder = Folder::new();
     folder.write("stand.toml", STAND);
@@ -125,13 +126,13 @@ fn diagnosed_as_held(factor: f64) -> serde_json::Value {
 #[test]
 fn an_input_that_is_held_is_no_effect() {
     assert_eq!(diagnosed_as_held(1.0)["verdict"], "nothing-missing");
-    // Nor does it hide one: a delay of half a sample would do for the rest.
+    // Nor does it hide one: a delay of half a sample would explain the rest.
     let report = diagnosed_as_held(1.1);
     assert_eq!(report["verdict"], "explained");
     assert_eq!(report["effects"], serde_json::json!(["gain-error"]));
 }
 
-/// A drift begins with the record, also where its stamps are seconds of 1970.
+/// A drift begins with the record, even if its stamps are seconds since 1970.
 #[test]
 fn stamps_far_from_zero_do_not_move_a_drift() {
     let folder = Folder::new();
@@ -228,7 +229,7 @@ fn resampling_says_what_it_bridged() {
     let warnings = report["warnings"].as_array().expect("a list");
     let told = warnings.iter().find(|w| w["code"] == "resampled");
     let message = told.expect("it is said")["message"].as_str().expect("text");
-    // From the sample before to the one after: 11 steps of 50 us.
+    // From the preceding sample to the following one: 11 steps of 50 us.
     assert!(
         message.contains("1 gap, the longest of 0.00055 s"),
         "{message}"

@@ -1,4 +1,4 @@
-//! What is said on standard error and in the log: `--quiet`, `--progress`, `NO_COLOR` and `--log`, of every verb.
+//! Standard error and the log: `--quiet`, `--progress`, `NO_COLOR` and `--log`, for every command.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -17,7 +17,7 @@ fn folder() -> Folder {
     folder
 }
 
-/// The words of every verb, those of a verb with several tests with each of them.
+/// The words of every command; a command with several tests is combined with each of them.
 fn verbs() -> Vec<Vec<String>> {
     let below = |words: &[String]| -> Vec<String> {
         let mut all = words.to_vec();
@@ -65,7 +65,7 @@ fn every_verb_takes_the_options_and_lists_them_in_one_group() {
     }
 }
 
-/// Runs in which clap or torqcomp says something: help, wrong usage, results, warnings, failures.
+/// Runs in which clap or torqcomp prints something: help, wrong usage, results, warnings, failures.
 const SAID: &[&[&str]] = &[
     &["--help"],
     &["-h"],
@@ -124,7 +124,7 @@ fn nothing_has_colours_where_they_are_not_wanted() {
         [output.stdout, output.stderr].concat()
     };
     let is_coloured = |bytes: &[u8]| bytes.contains(&0x1b);
-    // Without the variable, clap does colour: the test can see it.
+    // Without the variable, clap does use colour: the test can detect it.
     assert!(is_coloured(&said(&["--help"], None)));
     assert!(is_coloured(&said(&["compensat"], None)));
     for words in SAID {
@@ -142,7 +142,7 @@ fn quiet_leaves_out_notes_and_keeps_warnings_and_errors() {
     noted.says(0, &["calibration"]);
     let quiet = [&COMPENSATE[..], &["--force", "--quiet"]].concat();
     assert_eq!(folder.run(&quiet).stderr, "");
-    // Before the verb, too.
+    // Before the command, too.
     let before = [&["-q"], &COMPENSATE[..], &["--force"]].concat();
     assert_eq!(folder.run(&before).stderr, "");
     let warned = folder.run(&[&quiet[..], &["--band", "9000"]].concat());
@@ -159,7 +159,7 @@ fn quiet_leaves_out_notes_and_keeps_warnings_and_errors() {
         .run(&["-q", "inspect", "missing.csv"])
         .says(1, &["torqcomp: missing.csv: cannot be read"]);
     folder.run(&["-q", "inspect", "--jsn"]).says(2, &["--jsn"]);
-    // Results go on.
+    // Results are still printed.
     assert!(
         folder
             .run(&["inspect", "in.csv", "-q"])
@@ -168,7 +168,7 @@ fn quiet_leaves_out_notes_and_keeps_warnings_and_errors() {
     );
 }
 
-/// The lines of progress on standard error.
+/// The progress lines on standard error.
 fn progress(stderr: &str) -> Vec<Value> {
     let lines = stderr
         .lines()
@@ -223,7 +223,7 @@ fn lines_for_programs_come_at_most_every_half_second() {
     drop(pipe);
     let output = child.wait_with_output().expect("it ends");
     let lines = progress(&String::from_utf8(output.stderr).expect("UTF-8"));
-    // 20 pieces within 1.6 s or more: a line at once, and one for each half second at most.
+    // 20 pieces within at least 1.6 s: a line at once, and at most one per half second.
     let times: Vec<f64> = lines
         .iter()
         .map(|line| line["seconds"].as_f64().unwrap())
@@ -234,7 +234,7 @@ fn lines_for_programs_come_at_most_every_half_second() {
         "{times:?}"
     );
     for line in &lines {
-        // Nobody knows how long a pipe is.
+        // The length of a pipe is unknown.
         assert!(line["progress"].is_null() && line["bytes_total"].is_null());
         assert_eq!(line["file"], "standard input");
     }
@@ -283,7 +283,7 @@ fn the_log_has_the_start_each_warning_each_failure_and_the_end() {
     assert_eq!((&end["event"], &end["exit"]), (&"end".into(), &0.into()));
     assert!(end["seconds"].as_f64().unwrap() > 0.0);
 
-    // Failures of the work and of the command line, behind what is there.
+    // Failures of the work and of the command line are appended.
     let before = folder.read("run.jsonl");
     let failed = folder.run(&["inspect", "missing.csv", "--log", "run.jsonl"]);
     assert_eq!(failed.code, 1);
@@ -351,7 +351,7 @@ fn lines_of_processes_that_run_at_once_are_not_mixed() {
     for lines in runs.values() {
         assert_eq!(events(lines), ["start", "failure", "end"]);
     }
-    // A line that was cut by a kill stays by itself.
+    // A line truncated by a kill remains separate.
     let text = folder.read("run.jsonl");
     folder.write("run.jsonl", &text[..text.len() - 9]);
     folder.run(&["schema", "--log", "run.jsonl"]);
@@ -374,7 +374,7 @@ fn a_log_is_no_other_file_of_the_run() {
     folder
         .run(&["inspect", "in.csv", "--log", "no/folder.jsonl"])
         .says(1, &["no/folder.jsonl"]);
-    // A result that is there without its log is no success.
+    // A result without its log does not count as success.
     if cfg!(target_os = "linux") {
         folder
             .run(&["inspect", "in.csv", "--log", "/dev/full"])

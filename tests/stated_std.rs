@@ -1,5 +1,5 @@
-//! The uncertainty that results state: that of the calibration, of the response, of effects that bend, and none where the
-//! stand file gives none. And torques beyond what the transducer is made for.
+//! Stated uncertainty of results: from the calibration, the response, nonlinear effects, and none if the stand file
+//! gives none. And torques beyond the rating of the transducer.
 
 use std::f64::consts::TAU;
 
@@ -29,7 +29,7 @@ fn folder(heading: &str, more: &str) -> Folder {
     folder
 }
 
-/// The arguments of both verbs.
+/// The arguments of both commands.
 fn verbs() -> [Vec<&'static str>; 2] {
     let harmonics = [&HARMONICS[..], &["20", "--orders", "1"]].concat();
     [COMPENSATE.to_vec(), harmonics]
@@ -47,7 +47,8 @@ fn both(folder: &Folder) -> [Value; 2] {
     })
 }
 
-/// `s = f/f_n`: the inverse response is `1 − s²` but for the damping, so that 2 of 590 Hz change it by `2 s² δ/(1 − s²)`.
+/// `s = f/f_n`: the inverse response is `1 − s²` except for the damping, so that 2 of 590 Hz change it by
+/// `2 s² δ/(1 − s²)`.
 fn of_response(frequency_hz: f64) -> f64 {
     let square = (frequency_hz / 590.0).powi(2);
     2.0 * square * (2.0 / 590.0) / (1.0 - square)
@@ -108,8 +109,8 @@ fn calibration_and_response_are_stated_together() {
     );
 }
 
-/// `T = x + c x³` at rest: with `x = 2 + cos` and a std of 1e-5 of `c` that is 1e-5 x³, at most 2.7e-4, and by the moments of
-/// the cosine `⟨x⁶⟩ = 64 + 120 + 22.5 + 0.3125`. A calibration of ± 0.2 % adds 0.002 x (1 + 3 c x²).
+/// `T = x + c x³` statically: with `x = 2 + cos` and a std of 1e-5 of `c` that is 1e-5 x³, at most 2.7e-4, and by the
+/// moments of the cosine `⟨x⁶⟩ = 64 + 120 + 22.5 + 0.3125`. A calibration of ± 0.2 % adds 0.002 x (1 + 3 c x²).
 #[test]
 fn an_effect_that_bends_is_part_of_the_uncertainty() {
     let effect = "[[effects]]\nkind = \"cubic-stiffness\"\n\
@@ -164,13 +165,14 @@ fn a_torque_far_off_the_rated_one_is_warned_about() {
     let sheet = "[calibration]\nsensitivity = \"2 V\"\nrated_torque = \"20 N m\"\n";
     assert_eq!(codes(sheet), [false, false]);
     assert_eq!(codes(&sheet.replace("2 V", "200 mV")), [true, true]);
-    // As of a record before the amplifier: 0.15 % of the rated torque.
+    // As for a record before the amplifier: 0.15 % of the rated torque.
     let below = |text: &str| with_code("below-rated-torque", &sheet.replace("2 V", text));
     assert_eq!(below("2000 V"), [true, true]);
     assert_eq!(below("400 V"), [false, false]);
 }
 
-/// A loss in the material is part of the gain that is stated, `|1 − s² + j (2 ζ s + η)|`, and so is that its ends are felt far.
+/// Material damping is included in the stated gain, `|1 − s² + j (2 ζ s + η)|`, and so is the long range of its end
+/// effects.
 #[test]
 fn a_loss_in_the_material_is_part_of_the_gain() {
     let effect = "[[effects]]\nkind = \"structural-damping\"\nloss_factor = 0.05\n";

@@ -1,4 +1,4 @@
-//! Torques of no listed law: `diagnose` draws them over displacement and speed, and names no law.
+//! Torques of no listed law: `diagnose` plots them over displacement and speed, and names no law.
 
 use std::f64::consts::TAU;
 
@@ -8,17 +8,17 @@ use crate::noise::Noise;
 use crate::one_mode::{NATURAL_HZ, RATE_HZ, record};
 use crate::util::Folder;
 
-/// A torque over displacement and over speed divided by `ω`, in N m, beside a spring of 1.
+/// A torque over displacement and over speed divided by `ω`, in N m, in addition to a spring of 1.
 type Law = fn(f64, f64) -> f64;
 
-/// The diagnosis of the two records in a folder.
+/// Diagnosis of the two records in a folder.
 fn report(folder: &Folder, more: &[&str]) -> Value {
     let records = ["--train", "train.csv", "--holdout", "holdout.csv"];
     let channels = ["--applied", "applied_n_m", "--measured", "measured_n_m"];
     folder.json(&[&["diagnose", "--json"], &records[..], &channels, more].concat())
 }
 
-/// The diagnosis of two records, and the noise of the held-out one.
+/// Diagnosis of two records, and the noise of the held-out one.
 fn diagnosed(law: Law, folder: &Folder, more: &[&str]) -> (Value, f64) {
     let mut noise = Noise(7);
     let (train, _) = record(|_, x, v| law(x, v), (0.12, 50.0), &mut noise);
@@ -33,15 +33,15 @@ fn number(value: &Value) -> f64 {
     value.as_f64().expect("a number")
 }
 
-/// Points of a curve: place, torque, standard uncertainty.
+/// Points of a curve: position, torque, standard uncertainty.
 fn curve(report: &Value, name: &str) -> Vec<[f64; 3]> {
     let points = report["force_surface"][name].as_array().expect("points");
     let point = |p: &Value| ["at", "torque", "std"].map(|key| number(&p[key]));
     points.iter().map(point).collect()
 }
 
-/// Largest difference of a curve from a law up to a straight line, over its standard uncertainty or a least one, in the inner part
-/// of its range.
+/// Largest difference of a curve from a law up to a straight line, relative to its standard uncertainty or a minimum,
+/// in the inner part of its range.
 fn apart(points: &[[f64; 3]], inner: f64, least: f64, law: impl Fn(f64) -> f64) -> f64 {
     let largest = points.iter().map(|p| p[0].abs()).fold(0.0, f64::max);
     let inner: Vec<&[f64; 3]> = points
@@ -79,7 +79,7 @@ fn a_wavy_spring_is_drawn_and_gets_no_name() {
         number(&report["error"]["before"]["holdout_rms"]),
         number(&surface["holdout_rms"]),
     );
-    // Straight lines between the knots leave some of the waves.
+    // Linear interpolation between the knots misses some of the waves.
     assert!(
         before > 30.0 * noise && left < 2.0 * noise,
         "{before} {left} {noise}"
@@ -123,8 +123,7 @@ fn damping_in_one_direction_is_drawn() {
     assert!(apart < 4.0, "{apart} {points:?}");
 }
 
-/// Friction that changes along the displacement is no dry friction, and not nothing; if it grows with the displacement, it has a
-/// name.
+/// Position-dependent friction is neither dry friction nor nothing; if it grows with the displacement, it has a name.
 #[test]
 fn friction_that_depends_on_the_place_is_no_dry_friction() {
     let waves: Law = |x, v| 0.004 * (1.0 + 0.8 * (3.0 * x).sin()) * (20.0 * v).tanh();
@@ -152,7 +151,7 @@ fn friction_that_depends_on_the_place_is_no_dry_friction() {
     );
 }
 
-/// Where a law explains the records, there is nothing to draw.
+/// If a law explains the records, there is nothing to plot.
 #[test]
 fn a_listed_law_needs_no_surface() {
     let (report, _) = diagnosed(|x, _| 0.05 * x.powi(3), &Folder::new(), &[]);
@@ -161,7 +160,8 @@ fn a_listed_law_needs_no_surface() {
     assert!(report["force_surface"].is_null());
 }
 
-/// What a slow input moves follows it nearly as it is, and so would a slow disturbance the measured motion.
+/// The motion from a slow input follows it nearly proportionally, and a slow disturbance would follow the
+/// measured motion in the same way.
 #[test]
 fn a_slow_disturbance_follows_from_no_motion() {
     let folder = Folder::new();
@@ -171,7 +171,7 @@ fn a_slow_disturbance_follows_from_no_motion() {
         let (mut lines, mut disturbance) = (text.lines(), 0.0);
         let mut disturbed = format!("{}\n", lines.next().expect("a heading"));
         for line in lines {
-            // A wandering zero with a memory of half a second.
+            // A wandering zero with a correlation time of half a second.
             disturbance += -disturbance / (0.5 * RATE_HZ) + 0.3 * rms * noise.normal();
             let (rest, seen) = line.rsplit_once(',').expect("three columns");
             let seen: f64 = seen.parse().expect("a number");

@@ -1,4 +1,4 @@
-//! `table` against Appendix D of the thesis and against the response written out by hand.
+//! `table` against Appendix D of the thesis and against an explicit formula of the response.
 
 use crate::util::{Folder, hertel_response, table as rows_of};
 
@@ -71,7 +71,7 @@ fn linear_effects_are_in_it_and_others_are_refused() {
     };
     let ran = stand("kind = \"recorder-lowpass\"\nform = \"order-1\"\ncutoff = \"500 Hz\"");
     let (_, rows) = rows_of(&ran.stdout);
-    // At its corner a low-pass lets 1/√2 through, 45 degrees late.
+    // At its corner a low-pass has a gain of 1/√2 and a lag of 45 degrees.
     let (gain, lag) = hertel_response(500.0);
     assert!(
         (rows[0][1] * gain / 2.0_f64.sqrt() - 1.0).abs() < 1e-9,
@@ -82,7 +82,7 @@ fn linear_effects_are_in_it_and_others_are_refused() {
         "{rows:?}"
     );
     let ran = stand("kind = \"capacitive-coupling\"\nform = \"ac-coupled\"\ncorner = \"500 Hz\"");
-    // A series capacitor at its corner: 1/√2 as well, 45 degrees early; at rest it lets nothing through.
+    // A series capacitor at its corner: 1/√2 as well, with a lead of 45 degrees; it blocks DC.
     let (_, rows) = rows_of(&ran.stdout);
     assert!(
         (rows[0][2] - (-45.0 - lag.to_degrees())).abs() < 1e-7,
@@ -115,7 +115,7 @@ fn uncertainty_is_empty_where_it_is_unknown() {
         "--json",
     ]);
     // Far above resonance the inverse is Jω²/K: one per cent of K is one per cent of it, a little
-    // more by the 1 that is taken off, 16.4/15.4.
+    // more because of the 1 that is subtracted, 16.4/15.4.
     let std = report["rows"][0]["magnitude_relative_std"]
         .as_f64()
         .unwrap();

@@ -1,11 +1,11 @@
-//! LabVIEW TDMS files, written here by code that shares nothing with the reader: orders of bytes, layouts of raw data, metadata
-//! that refer to those before, DAQmx scalers, and what is cut off or contradicts itself. Those of npTDMS are in `recordings`.
+//! LabVIEW TDMS files, written here by code independent of the reader: byte orders, layouts of raw data, metadata that
+//! refer to previous ones, DAQmx scalers, and truncated or inconsistent data. Those of npTDMS are in `recordings`.
 
 use serde_json::Value;
 
 use crate::util::{Folder, table};
 
-/// Raw data index: type, count, and of text the bytes.
+/// Raw data index: type, count, and for text the number of bytes.
 const NO_DATA: u32 = u32::MAX;
 const AS_BEFORE: u32 = 0;
 /// Bits of the table of contents.
@@ -16,7 +16,7 @@ const INTERLEAVED: u32 = 32;
 const BIG: u32 = 64;
 const DAQMX: u32 = 128;
 
-/// Bytes in one order.
+/// Bytes in a given order.
 struct Out {
     bytes: Vec<u8>,
     is_big: bool,
@@ -50,7 +50,7 @@ impl Out {
         self
     }
 
-    /// Path and index of an object; `0` and `u32::MAX` in place of an index of values.
+    /// Path and index of an object; `0` and `u32::MAX` instead of an index of values.
     fn object(&mut self, path: &str, index: Result<(u32, u64), u32>) -> &mut Self {
         self.text(path);
         match index {
@@ -71,7 +71,7 @@ impl Out {
         self.text(key).u32(0x44).stamp(seconds, fraction)
     }
 
-    /// Seconds since 1904 and parts of 2⁶⁴.
+    /// Seconds since 1904 and units of 2⁻⁶⁴ s.
     fn stamp(&mut self, seconds: i64, fraction: u64) -> &mut Self {
         self.raw(&(i128::from(seconds) << 64 | i128::from(fraction)).to_le_bytes())
     }
@@ -101,7 +101,7 @@ fn values(folder: &Folder, channel: &str) -> Vec<f64> {
     table(&ran.stdout).1.iter().map(|row| row[1]).collect()
 }
 
-/// A type of the format, and how it stores a number.
+/// A type of the format, and its storage of a number.
 type Kind = (u32, fn(f64) -> Vec<u8>);
 
 const TYPES: [Kind; 13] = [
@@ -120,7 +120,7 @@ const TYPES: [Kind; 13] = [
     (0x21, |v| vec![u8::from(v > 0.0)]),
 ];
 
-/// What a type stores of a number.
+/// A number as stored by a type.
 fn as_stored(kind: u32, value: f64) -> f64 {
     match kind {
         5..=8 => value.max(0.0),
@@ -185,8 +185,8 @@ fn numbers_of_every_type_order_and_layout_are_read() {
         .says(1, &["lead-in of segment 1"]);
 }
 
-/// Two channels in the first segment; then no metadata, one channel with another count, a third channel beside them, and a
-/// list anew.
+/// Two channels in the first segment; then no metadata, one channel with another count, a third channel in addition,
+/// and a new list.
 fn segments() -> Vec<Vec<u8>> {
     let doubles =
         |values: &[f64]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };
@@ -268,7 +268,7 @@ fn metadata_refer_to_those_before() {
     refused.says(1, &["1000 Hz", "500 Hz"]);
 }
 
-/// Each prefix of a file gives what is whole of it, with code 3, or is refused; never a sample too many.
+/// Each prefix of a file gives its complete part, with code 3, or is rejected; never a sample too many.
 #[test]
 fn what_is_whole_of_a_cut_file_is_read() {
     let folder = Folder::new();
@@ -321,7 +321,7 @@ fn a_file_that_was_not_closed_gives_what_is_whole() {
         };
         let wanted: Vec<f64> = wanted.into_iter().map(f64::from).collect();
         assert_eq!(values(&folder, "g/a"), wanted);
-        // A last chunk with fewer samples, in a segment that was closed, is whole.
+        // A last chunk with fewer samples, in a closed segment, is complete.
         folder.write(
             "a.tdms",
             segment(contents, 4713, &metadata, &data[..24], false),
@@ -346,7 +346,7 @@ fn damage_behind_whole_segments_leaves_them() {
     let ran = folder.run(&["extract", "a.tdms", "--channel", "g/a"]);
     ran.says(3, &["segment-damaged", "segment 2", "does not begin with"]);
     assert_eq!(table(&ran.stdout).1.len(), 4);
-    // Lengths that are claimed reserve nothing.
+    // Claimed lengths reserve nothing.
     let mut metadata = Out::new(false);
     metadata
         .u32(1)
@@ -478,7 +478,7 @@ fn daqmx_scalers_lie_in_rows_of_buffers() {
         .says(1, &["DAQmx scaler"]);
 }
 
-/// Properties of a channel that are texts, those that are numbers, and what is said of them.
+/// Text properties of a channel, numeric ones, and the expected message.
 type Case<'a> = (&'a [(&'a str, &'a str)], &'a [(&'a str, f64)], &'a str);
 
 #[test]

@@ -7,7 +7,7 @@ mod agreement;
 mod bad_input;
 mod band;
 mod batch;
-#[allow(dead_code)] // the example writes and scores what the tests only look into
+#[allow(dead_code)] // the example writes and scores what the tests only examine
 mod blind;
 mod blind_generator;
 mod blind_wide;
@@ -30,13 +30,13 @@ mod inspect;
 mod known_loads;
 mod mcap_file;
 mod measuring_chains;
-#[cfg(target_os = "linux")] // the system tells how much memory a process had at most
+#[cfg(target_os = "linux")] // peak memory of a process is available there
 mod memory;
 mod merge;
 mod messages;
 mod modes;
 mod modes_diagnosed;
-#[cfg(all(unix, not(target_os = "macos")))] // file systems of macOS refuse other names
+#[cfg(all(unix, not(target_os = "macos")))] // file systems of macOS reject other names
 mod motion;
 mod mutations;
 mod names;

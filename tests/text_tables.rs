@@ -1,8 +1,8 @@
-//! Text as recorders write it, all holding the same record.
+//! Text formats of recorders, all with the same record.
 
 use crate::util::{COMPENSATE, Folder, column};
 
-/// Twelve hundred samples at 10 kHz in a form of the caller's.
+/// Twelve hundred samples at 10 kHz in the caller's format.
 fn rows(row: impl Fn(f64, f64) -> String) -> String {
     (0..1200)
         .map(|i| {
@@ -200,7 +200,7 @@ fn other_units_columns_and_time_axes() {
     );
 }
 
-/// Rows from the last to the first are no record of unknown rate.
+/// Rows in reverse order are not a record of unknown rate.
 #[test]
 fn rows_in_reverse_order_are_to_be_sorted() {
     let folder = Folder::new();
@@ -301,7 +301,7 @@ fn a_point_that_may_stand_between_thousands_is_asked_for() {
     }
 }
 
-/// 4,026 mV beside 1.500 1/min: one of the two marks stands between thousands.
+/// 4,026 mV next to 1.500 1/min: one of the two marks is a thousands separator.
 #[test]
 fn commas_and_points_that_both_read_both_ways_are_asked_for() {
     let folder = Folder::new();
@@ -379,7 +379,7 @@ fn a_number_means_the_same_channel_in_every_verb() {
     assert_eq!(simulated("2"), simulated("answer_n_m"));
 }
 
-/// Rows and columns swapped, as some exports have them: a question in a few lines, whatever the verb.
+/// Transposed tables, as in some exports: a question in a few lines, whatever the command.
 #[test]
 fn a_table_on_its_side_is_asked_about() {
     let folder = Folder::new();
@@ -408,7 +408,7 @@ fn a_table_on_its_side_is_asked_about() {
             );
         }
     }
-    // Many channels are no question where there are rows for them.
+    // Many channels are not suspicious with enough rows.
     let head: Vec<String> = (0..400).map(|i| format!("c{i} [V]")).collect();
     let rows: String = (0..60)
         .map(|r| format!("{},{}\n", r as f64 * 0.001, vec!["1.5"; 400].join(",")))
@@ -421,7 +421,7 @@ fn a_table_on_its_side_is_asked_about() {
         .says(1, &["and 380 more"]);
 }
 
-/// Rows that are longer than what is looked at of a usual table: every verb takes the column that is asked for.
+/// Rows longer than the part examined of a usual table: every command reads the requested column.
 #[test]
 fn tables_with_very_many_columns_are_read() {
     const COLUMNS: usize = 40_000;
@@ -462,7 +462,8 @@ fn torque(i: usize) -> f64 {
     6.0 + (std::f64::consts::TAU * 0.01 * i as f64).sin()
 }
 
-/// Two exports in one file, the second in other units under the same name of the time: no rows of one table.
+/// Two exports in one file, the second in other units under the same name of the time: not rows of one
+/// table.
 #[test]
 fn headings_in_other_units_among_the_rows_begin_another_table() {
     let folder = Folder::new();
@@ -470,7 +471,7 @@ fn headings_in_other_units_among_the_rows_begin_another_table() {
         let row = |i: usize| format!("{:.3},{:.4}\n", 1e-3 * i as f64, scale * torque(i));
         range.map(row).collect()
     };
-    // Within the first rows that are looked at, and behind them.
+    // Within the first rows that are examined, and after them.
     for (count, said) in [
         (2000, "of segment 2"),
         (20_000, "line 20002: another table"),
@@ -485,7 +486,7 @@ fn headings_in_other_units_among_the_rows_begin_another_table() {
             ran.says(1, &[said]);
         }
     }
-    // Another line of words among the rows is said.
+    // Another text line among the rows is reported.
     folder.write(
         "in.csv",
         format!(
@@ -498,7 +499,8 @@ fn headings_in_other_units_among_the_rows_begin_another_table() {
     ran.says(0, &["lines-skipped", "operator: lab"]);
 }
 
-/// A clock of whole seconds beside their milliseconds, at a rate at which the first rows lie within one second.
+/// A clock of whole seconds with a column of milliseconds, at a rate at which the first rows are within one
+/// second.
 #[test]
 fn milliseconds_beside_a_clock_of_seconds_are_their_parts() {
     let folder = Folder::new();
@@ -518,7 +520,7 @@ fn milliseconds_beside_a_clock_of_seconds_are_their_parts() {
     folder
         .run(&COMPENSATE)
         .says(0, &["12000 samples at 5000 Hz"]);
-    // At the rate of a PLC they begin anew so rarely that they seem to rise.
+    // At the rate of a PLC they restart so rarely that they seem to rise.
     let row = |i: usize| format!("10:11:{:02},{},{:.4}\n", 12 + i / 1000, i % 1000, torque(i));
     let rows: String = (0..3000).map(row).collect();
     folder.write("in.csv", format!("Time,ms,Torque [Nm]\n{rows}"));

@@ -1,4 +1,4 @@
-//! Cells that are no plain numbers: other minus signs, words and numbers that mark missing values.
+//! Cells other than plain numbers: other minus signs, words and numbers for missing values.
 
 use crate::util::{COMPENSATE, Folder, assert_close, column};
 
@@ -171,7 +171,7 @@ fn decimal_commas_between_commas_are_asked_about() {
             folder.run(&[&COMPENSATE[..], more].concat()).says(1, &asks);
         }
     }
-    // One column says which of two options it is read by.
+    // One column decides between two readings.
     let single: String = (0..2000)
         .map(|i| comma(format!("{:.5}\n", torque(i))))
         .collect();
@@ -183,7 +183,7 @@ fn decimal_commas_between_commas_are_asked_about() {
     folder
         .run(&[&inspect[..], &["--decimal", ","]].concat())
         .says(0, &[]);
-    // Whole numbers under as many headings are whole numbers.
+    // Integers under as many headings are integers.
     let counts: String = (0..2000)
         .map(|i| format!("{i},{},{},{}\n", i % 7, i % 10, i % 100))
         .collect();
@@ -204,13 +204,14 @@ fn the_heading_of_a_single_column_may_have_spaces() {
         let run = folder.run(&[&COMPENSATE[..], &["--force", "--rate", "1000"]].concat());
         run.says(0, &[&format!("{name} in N"), "2000 samples"]);
     }
-    // A setting above a column is none of its headings.
+    // A setting above a column is not one of its headings.
     folder.write("in.csv", format!("Sampling rate 1000 Hz\n{rows}"));
     let report = folder.json(&["inspect", "in.csv", "--json"]);
     assert_eq!(report["channels"][0]["name"], "column 1");
 }
 
-/// Each cell of the channel with its unit, that of the time as well, in changing units, or beside another channel: never a torque.
+/// Each cell of the channel with its unit, that of the time as well, with changing units, or next to another channel:
+/// never a torque.
 #[test]
 fn cells_with_units_are_refused_with_their_place() {
     let folder = Folder::new();
@@ -241,7 +242,8 @@ fn cells_with_units_are_refused_with_their_place() {
     folder.run(&COMPENSATE).says(1, &["line 1502", "6000 mN m"]);
 }
 
-/// `ros2 topic echo --csv` writes no headings: seconds and nanoseconds of the stamp, the frame, and the fields of the message.
+/// `ros2 topic echo --csv` writes no headings: seconds and nanoseconds of the stamp, the frame, and the fields of the
+/// message.
 #[test]
 fn rows_of_ros2_topic_echo_have_the_time_of_their_stamps() {
     let folder = Folder::new();

@@ -1,4 +1,4 @@
-//! Time stamps: the rate that they say, in every verb the same, and what is missing among them.
+//! Time stamps: the rate that they give, the same in every command, and missing samples among them.
 
 use serde_json::Value;
 
@@ -8,7 +8,7 @@ use crate::util::{COMPENSATE, Folder, Ran};
 /// Nanoseconds since 1970 at which the records begin: 2024-03-12T13:26:40Z.
 const START_NS: u128 = 1_710_250_000_000_000_000;
 
-/// A stamp of a clock that counts from 1970, rounded to whole units of so many ns, as text.
+/// A stamp of a clock that counts from 1970, rounded to multiples of a unit in ns, as text.
 type Spelling = fn(u128) -> String;
 
 fn seconds(ns: u128, decimals: u32) -> String {
@@ -19,7 +19,7 @@ fn seconds(ns: u128, decimals: u32) -> String {
     format!("{whole}.{part:0width$}", width = decimals as usize)
 }
 
-/// The signal in volts at 1/128 of the rate, so that all verbs can work with it.
+/// The signal in volts at 1/128 of the rate, so that all commands can use it.
 fn record(rate_hz: (u128, u128), samples: u128, unit: &str, spell: Spelling) -> String {
     let (hz, per) = rate_hz;
     let rows = (0..samples).map(|i| {
@@ -35,7 +35,7 @@ fn json(ran: &Ran) -> Value {
     serde_json::from_str(&ran.stdout).expect("one JSON document")
 }
 
-/// The rate and the start that each verb takes from a record.
+/// Rate and start of a record according to each command.
 fn rates(folder: &Folder, name: &str, hz: f64) -> Vec<(&'static str, f64, i64)> {
     let fundamental = format!("{}", hz / 128.0);
     let band = format!("{}", hz / 16.0);
@@ -81,8 +81,8 @@ fn rates(folder: &Folder, name: &str, hz: f64) -> Vec<(&'static str, f64, i64)> 
     found
 }
 
-/// Stamps since 1970 say the rate of the record to 1e-9, in every verb, however they are written: the rates are those of
-/// recorders, 25.6 kHz being 39.0625 µs a step and 44.1 kHz no whole number of anything.
+/// Stamps since 1970 give the rate of the record to 1e-9, in every command, however they are written: the rates are
+/// those of recorders, with 39.0625 µs per step for 25.6 kHz and no round step for 44.1 kHz.
 #[test]
 fn the_rate_of_epoch_stamps_is_exact_in_every_verb() {
     let spellings: [(&str, Spelling); 6] = [
@@ -94,7 +94,7 @@ fn the_rate_of_epoch_stamps_is_exact_in_every_verb() {
         }),
         ("us", |ns| ((ns + 500) / 1000).to_string()),
         ("ns", |ns| ns.to_string()),
-        // As numpy writes an f64.
+        // An f64 as written by numpy.
         ("s", |ns| format!("{:.18e}", ns as f64 * 1e-9)),
     ];
     let folder = Folder::new();
@@ -121,8 +121,8 @@ fn the_rate_of_epoch_stamps_is_exact_in_every_verb() {
     }
 }
 
-/// A record whose columns suit one verb each: torque and answer of a resonance at 0.2 rad a sample, an angle and the torque
-/// that moves it, a decay of 32 samples a period.
+/// A record whose columns suit one command each: torque and response of a resonance at 0.2 rad per sample, an angle and
+/// the torque that moves it, a decay of 32 samples per period.
 fn record_of_all(hz: (u128, u128), heading: &str, spell: &dyn Fn(u128) -> String) -> String {
     let (mut state, mut before) = (1_u64, [0.0; 2]);
     let turn = std::f64::consts::TAU / 256.0;
@@ -152,7 +152,8 @@ fn record_of_all(hz: (u128, u128), heading: &str, spell: &dyn Fn(u128) -> String
     format!("{heading},{names}\n{}", rows.collect::<String>())
 }
 
-/// A stamp in ISO 8601 with that many digits of a second; the records are shorter than the rest of the month.
+/// A stamp in ISO 8601 with this many decimals of a second; the records are shorter than the rest of the
+/// month.
 fn iso(ns: u128, decimals: u32) -> String {
     let text = seconds(ns, decimals);
     let (whole, part) = text.split_once('.').expect("a part of a second");
@@ -166,8 +167,8 @@ fn iso(ns: u128, decimals: u32) -> String {
     )
 }
 
-/// The verbs that read a record as a whole, and `extract`, take the same rate, also from dates and from stamps that begin at
-/// zero.
+/// The commands that read a whole record, and `extract`, use the same rate, also from dates and from stamps that begin
+/// at zero.
 #[test]
 fn the_rate_is_the_same_in_every_verb_that_takes_a_record() {
     let spellings: [(&str, Spelling); 7] = [
@@ -266,7 +267,7 @@ fn the_rate_is_the_same_in_every_verb_that_takes_a_record() {
     }
 }
 
-/// 10 MHz needs nanoseconds, and a clock that counts from zero has them in any case.
+/// 10 MHz needs nanoseconds, which a clock that counts from zero always has.
 #[test]
 fn the_rate_of_fast_records_is_exact() {
     let folder = Folder::new();
@@ -298,8 +299,8 @@ fn the_rate_of_fast_records_is_exact() {
     }
 }
 
-/// Order 10 of a record with stamps since 1970 has the size that it has with stamps from zero: 0.5 N m. With a rate that
-/// is off by 0.2 % it would be lost.
+/// Order 10 of a record with stamps since 1970 has the same amplitude as with stamps from zero: 0.5 N m. With a rate
+/// off by 0.2 % it would be lost.
 #[test]
 fn high_orders_keep_their_size_whatever_the_clock() {
     let folder = Folder::new();
@@ -379,8 +380,8 @@ const READERS: [&[&str]; 5] = [
     &["identify", "decay", "record.csv"],
 ];
 
-/// An empty cell of the time, in the middle, at the start, and from some row to the end, and one of the value: every verb
-/// refuses it at the same line with the same remedy, and none prints a number that is none.
+/// An empty time cell, in the middle, at the start, and from some row to the end, and an empty value cell: every
+/// command rejects it at the same line with the same remedy, and none prints a non-finite number.
 #[test]
 fn blank_cells_are_refused_in_every_verb() {
     let folder = Folder::new();
@@ -416,7 +417,8 @@ fn blank_cells_are_refused_in_every_verb() {
     }
 }
 
-/// A text cut anywhere within its last two rows: what is left is whole, or code 3 says that it is not.
+/// A text truncated anywhere within its last two rows: the remainder is complete, or code 3 says that
+/// it is not.
 #[test]
 fn a_cut_text_is_never_taken_for_a_whole_one() {
     let folder = Folder::new();
@@ -451,7 +453,8 @@ fn a_cut_text_is_never_taken_for_a_whole_one() {
     }
 }
 
-/// Stamps as pandas writes them: with offsets over the end of daylight saving, and as times since the start.
+/// Stamps as written by pandas: with offsets over the end of daylight saving time, and as times since the
+/// start.
 #[test]
 fn offsets_and_durations_of_pandas_are_times() {
     let folder = Folder::new();
@@ -478,8 +481,8 @@ fn offsets_and_durations_of_pandas_are_times() {
     with(&|i| format!("0 days 00:00:{:02}.{:03}000", i / 1000, i % 1000));
 }
 
-/// 20 kHz with stamps in whole milliseconds, twenty samples a stamp: the rate is that of all of them, nothing is left out,
-/// and the times are those of the samples.
+/// 20 kHz with stamps in whole milliseconds, twenty samples per stamp: the rate is that of all of them, nothing is
+/// omitted, and the times are those of the samples.
 #[test]
 fn stamps_that_samples_share_give_the_rate() {
     let folder = Folder::new();
@@ -576,7 +579,7 @@ fn header_stamps_that_samples_share_give_the_rate() {
     assert!(row.starts_with("1700000000.0015"), "{row}");
 }
 
-/// A part of a record by seconds, by seconds since 1970, by seconds after its start, and by time of day.
+/// Part of a record by seconds, by seconds since 1970, by seconds after its start, and by time of day.
 #[test]
 fn a_range_is_taken_by_any_clock() {
     let folder = Folder::new();
@@ -648,7 +651,7 @@ fn a_range_is_taken_by_any_clock() {
         .says(2, &["--range"]);
 }
 
-/// Rows left out of a straight line, and empty cells in it, come back on the line.
+/// Rows missing from a straight line, and empty cells in it, are restored on the line.
 #[test]
 fn missing_samples_are_filled_when_that_is_asked_for() {
     let folder = Folder::new();
@@ -695,7 +698,7 @@ fn missing_samples_are_filled_when_that_is_asked_for() {
     assert!((report["filled"][0]["from_s"].as_f64().unwrap() - 0.0099).abs() < 1e-12);
 }
 
-/// Two samples are a record: no verb breaks at them.
+/// Two samples are a record: no command crashes on them.
 #[test]
 fn a_record_of_two_samples_is_simulated_or_refused() {
     let folder = Folder::new();
@@ -717,8 +720,8 @@ fn a_record_of_two_samples_is_simulated_or_refused() {
     }
 }
 
-/// One record as a table and as messages, its clock beginning at the start of the machine or in 1970: a range is the same
-/// instant in both and in every verb, and phases refer to the same moment.
+/// One record as a table and as messages, with a clock that starts with the machine or in 1970: a range is the same
+/// instant in both and in every command, and phases refer to the same moment.
 #[test]
 fn a_range_is_the_same_instant_in_a_table_and_in_messages() {
     for (first_ns, range) in [
@@ -750,7 +753,7 @@ fn a_range_is_the_same_instant_in_a_table_and_in_messages() {
             file.message(channel, i as usize, ns, message.as_bytes());
         }
         folder.write("in.csv", text).write("in.mcap", file.finish());
-        // A part of a name in any case chooses a number of messages as it chooses a column.
+        // Part of a name in any case selects a number of messages like a column.
         let mcap = ["--time", "publish", "--unit", "N m", "--channel", "torque"];
         for range in range {
             let both = |args: &[&'static str]| {
@@ -768,7 +771,7 @@ fn a_range_is_the_same_instant_in_a_table_and_in_messages() {
                     .collect::<Vec<_>>()
             });
             assert_eq!(rows[0].len(), 501, "{range}");
-            // Messages have stamps in ns, and rows of them nine decimals.
+            // Messages have stamps in ns, and their rows nine decimals.
             let plain = |row: &String| {
                 let (time, value) = row.split_once(',').unwrap();
                 let time = time.trim_end_matches('0').trim_end_matches('.');
@@ -797,8 +800,8 @@ fn a_range_is_the_same_instant_in_a_table_and_in_messages() {
     }
 }
 
-/// Stamps of 1999 Hz in µs over 1 s: the rate is known to 1e-6/√3 of it at worst. Stamps whose last digit but 0.1 ms is always
-/// zero may be rounded to that. Stamps that scatter: by the scatter of both ends.
+/// Stamps of 1999 Hz in µs over 1 s: the relative uncertainty of the rate is at worst 1e-6/√3. Stamps whose last digits
+/// are zero except 0.1 ms may be rounded to that. With jitter: from the scatter of both ends.
 #[test]
 fn a_rate_from_stamps_has_an_uncertainty() {
     let folder = Folder::new();
@@ -864,7 +867,7 @@ fn a_rate_from_stamps_has_an_uncertainty() {
     assert!((stated / want - 1.0).abs() < 0.1, "{stated} {want}");
 }
 
-/// Samples lost between stamps that are rounded to the millisecond, or to the second, of which several share one.
+/// Samples lost between stamps rounded to the millisecond, or to the second, several of which share one.
 #[test]
 fn lost_samples_between_rounded_stamps_are_named_with_their_place() {
     let folder = Folder::new();

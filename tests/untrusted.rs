@@ -1,8 +1,8 @@
-//! Names out of files, which anybody may have written.
+//! Names from files, which may be malicious.
 
 use crate::util::{Folder, sampled};
 
-/// Sets the title of a terminal window, moves its cursor, and ends a tag.
+/// Sets the title of a terminal window, moves its cursor, and closes a tag.
 const NAMES: [&str; 4] = [
     "a\u{1b}]0;owned\u{7}",
     "\u{9b}2Jcleared",

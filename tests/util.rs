@@ -1,4 +1,4 @@
-//! Running the binary in a folder of its own.
+//! Running the binary in a separate folder.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ pub const COMPENSATE: [&str; 6] = [
     "out.csv",
 ];
 
-/// Components of `in.csv`, of the fundamental that follows.
+/// Components of `in.csv`, for the fundamental that follows.
 pub const HARMONICS: [&str; 5] = [
     "harmonics",
     "in.csv",
@@ -45,13 +45,13 @@ pub const SIMULATE: [&str; 6] = [
     "applied_n_m",
 ];
 
-/// Records of each case of a test that counts how often something holds: few, unless the environment asks for more.
+/// Number of records per case of a test of coverage: few, unless the environment requests more.
 pub fn trials(default: usize) -> usize {
     let number = std::env::var("TORQCOMP_TRIALS").ok();
     number.and_then(|n| n.parse().ok()).unwrap_or(default)
 }
 
-/// Sends a process a signal.
+/// Sends a signal to a process.
 pub fn signal(name: &str, child: &std::process::Child) {
     let sent = std::process::Command::new("kill")
         .args(["-s", name, &child.id().to_string()])
@@ -68,7 +68,7 @@ pub fn codes(report: &Value) -> Vec<&str> {
 /// A folder that is removed with its files.
 pub struct Folder(tempfile::TempDir);
 
-/// What a run of the binary left.
+/// Results of a run of the binary.
 #[derive(Debug)]
 pub struct Ran {
     pub code: i32,
@@ -139,7 +139,7 @@ impl Folder {
         }
     }
 
-    /// Runs a command that must succeed, and reads its JSON.
+    /// Runs a command that must succeed, and parses its JSON.
     pub fn json(&self, args: &[&str]) -> Value {
         let ran = self.run(args);
         assert_eq!(ran.code, 0, "{args:?}: {}", ran.stderr);
@@ -147,7 +147,7 @@ impl Folder {
     }
 }
 
-/// The command in a folder, its outputs captured.
+/// The command in a folder, with its outputs captured.
 pub fn command(folder: &Path, args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_torqcomp"));
     command
@@ -159,7 +159,7 @@ pub fn command(folder: &Path, args: &[&str]) -> Command {
 }
 
 impl Ran {
-    /// Checks the exit code and that standard error says all of these.
+    /// Checks the exit code and that standard error contains all of these.
     pub fn says(&self, code: i32, parts: &[&str]) -> &Self {
         assert_eq!(self.code, code, "stderr: {}", self.stderr);
         for part in parts {
@@ -203,14 +203,14 @@ pub fn column(text: &str, name: &str) -> Vec<f64> {
 }
 
 /// Response of Hertel's stand, `K / (K − Jω² + jωf)`, in the units of the thesis: magnitude and
-/// phase in rad. Written out here so that the tests do not lean on the code they test.
+/// phase in rad. Written out here to be independent of the code under test.
 pub fn hertel_response(frequency_hz: f64) -> (f64, f64) {
     let omega = std::f64::consts::TAU * frequency_hz;
     let (real, imaginary) = (8.1e4 - 5.85e-3 * omega * omega, 3.07 * omega);
     (8.1e4 / real.hypot(imaginary), -imaginary.atan2(real))
 }
 
-/// A steady record: torque components (amplitude in N m, Hz, rad) as the beam shows them, and the
+/// A steady record: torque components (amplitude in N m, Hz, rad) as shown by the beam, and the
 /// torque itself, at a rate and for a number of samples.
 pub fn steady(parts: &[(f64, f64, f64)], rate_hz: f64, count: usize) -> (Vec<f64>, Vec<f64>) {
     (0..count)
@@ -230,7 +230,7 @@ pub fn steady(parts: &[(f64, f64, f64)], rate_hz: f64, count: usize) -> (Vec<f64
         .unzip()
 }
 
-/// A recorder's file of a column beside `time_s`, to 17 digits: `value` of the number of the sample.
+/// A recorder's file with `time_s` and another column, to 17 digits: `value` of the sample index.
 pub fn sampled(heading: &str, rate_hz: f64, count: usize, value: impl Fn(usize) -> f64) -> String {
     let row = |i| format!("{},{:e}\n", i as f64 / rate_hz, value(i));
     let rows: String = (0..count).map(row).collect();
@@ -243,7 +243,7 @@ pub fn record(torque_n_m: &[f64], rate_hz: f64) -> String {
     sampled("bridge_V", rate_hz, torque_n_m.len(), volts)
 }
 
-/// Fails with got, want and difference unless both agree to a relative tolerance.
+/// Fails with actual, expected and difference unless both agree to a relative tolerance.
 #[track_caller]
 pub fn assert_close(got: f64, want: f64, relative: f64) {
     let difference = (got - want).abs() / want.abs();

@@ -1,4 +1,4 @@
-//! Whether a file in a folder is a recording, by its first bytes.
+//! Detection of recordings in a folder, by their first bytes.
 
 use std::io::Read;
 use std::path::Path;
@@ -8,18 +8,18 @@ use crate::io::{Input, MCAP_START};
 use crate::log;
 use crate::recording::formats;
 
-/// Bytes that are looked at.
+/// Number of bytes examined.
 const HEAD: u64 = 1 << 16;
-/// Marks of text in two bytes a letter.
+/// Byte order marks of UTF-16.
 const WIDE_TEXT: [&[u8]; 2] = [b"\xff\xfe", b"\xfe\xff"];
-/// Beginning of a stand file's first key.
+/// Start of a stand file's first key.
 const STAND: &str = "schema = \"torqcomp.";
 
-/// Whether it begins as an MCAP file does, or as a text with rows of numbers that torqcomp did not write as a stand file,
-/// manifest, log or summary. A file that cannot be read is one: the reason is said when it is read.
+/// Whether it begins like an MCAP file, or like a text with rows of numbers that is not a stand file, manifest, log or
+/// summary written by torqcomp. An unreadable file counts as a recording; the reason is reported when it is read.
 pub(super) fn is_recording(path: &Path) -> bool {
     let mut head = Vec::new();
-    // What is compressed is judged by its content.
+    // A compressed file is judged by its content.
     let read = Input::File(path.to_owned())
         .open()
         .map(|file| file.take(HEAD).read_to_end(&mut head));

@@ -1,4 +1,4 @@
-//! The last run that a manifest is about.
+//! The last run in a manifest.
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
@@ -9,26 +9,26 @@ use crate::failure::Failure;
 use crate::file_name::ShowPath;
 use crate::io::storage;
 
-/// What became of the recordings of a manifest's last run.
+/// Results for the recordings of a manifest's last run.
 pub(super) struct LastRun {
     pub(super) manifest: String,
     pub(super) begin: RunBegin,
     pub(super) shard: Option<Shard>,
-    /// Those that were worked on or skipped, in the order of the run.
+    /// Those that were processed or skipped, in the order of the run.
     pub(super) entries: Vec<ManifestEntry>,
     /// Those that were not.
     pub(super) not_done: Vec<String>,
-    /// Whether it came to its end.
+    /// Whether it was completed.
     pub(super) has_ended: bool,
 }
 
-/// The lines of a manifest as they are read.
+/// The lines of a manifest while it is read.
 #[derive(Default)]
 struct ManifestLines {
-    /// The last entry of each verb and recording.
+    /// The last entry for each command and recording.
     last: HashMap<(String, String), ManifestEntry>,
     begin: Option<RunBegin>,
-    /// Recordings that the run that began last has worked on or skipped.
+    /// Recordings processed or skipped by the most recent run.
     done: HashSet<String>,
     has_ended: bool,
 }
@@ -47,7 +47,7 @@ impl LastRun {
         Ok(lines.run(path.shown().to_string()))
     }
 
-    /// What identifies it to people: its part, or that it has none.
+    /// Its description: its part, or that it has none.
     pub(super) fn part(&self) -> String {
         match self.shard {
             Some(shard) => format!("part {shard}"),
@@ -73,7 +73,7 @@ impl ManifestLines {
                 self.done.extend(end.skipped);
                 self.has_ended = true;
             }
-            // Cut by a kill: what it was about has no other line, and counts as not done.
+            // Truncated by a kill: its recording has no other line, and counts as not done.
             None => {}
         }
     }

@@ -1,4 +1,4 @@
-//! The recordings that are meant: paths, folders, patterns and lists of paths.
+//! Selection of recordings: paths, folders, patterns and lists of paths.
 
 use std::collections::HashSet;
 use std::ffi::{OsStr, OsString};
@@ -15,21 +15,21 @@ use crate::io::Input;
 pub(super) struct FoundFile {
     /// Its path as given, or below the folder as given.
     pub(super) path: PathBuf,
-    /// Its path below its root, the folders separated by `/`: the same in its results.
+    /// Its path relative to its root, with `/` between folders; its results have the same.
     pub(super) relative: String,
-    /// Why it cannot be read, if that is known already.
+    /// Why it cannot be read, if already known.
     pub(super) problem: Option<Failure>,
 }
 
-/// All recordings that are meant, in the order given; those of a folder in the order of their names.
+/// All selected recordings, in the given order; those of a folder in the order of their names.
 #[derive(Debug, Default)]
 pub(super) struct Listing {
     pub(super) files: Vec<FoundFile>,
-    /// Files of folders that are no recordings by their content.
+    /// Files of folders that are not recordings by their content.
     pub(super) left_out: Vec<String>,
 }
 
-/// Letters that make a path a pattern, unless a file has that name.
+/// Characters that make a path a pattern, unless a file has that name.
 const PATTERN: [char; 3] = ['*', '?', '['];
 
 /// Whether a path names a folder, or files by a pattern.
@@ -41,20 +41,20 @@ fn is_pattern(input: &Path) -> bool {
     input.shown().to_string().contains(PATTERN) && std::fs::symlink_metadata(input).is_err()
 }
 
-/// How names match a pattern.
+/// Rules for matching names with a pattern.
 const OPTIONS: glob::MatchOptions = glob::MatchOptions {
     case_sensitive: true,
     require_literal_separator: true,
     require_literal_leading_dot: true,
 };
 
-/// A part of a pattern, between separators.
+/// A component of a pattern, between separators.
 enum PatternPart<'a> {
     /// A name, a root, `.` or `..`.
     Fixed(&'a OsStr),
     /// `**`: any number of folders.
     AnyFolders,
-    /// Names that match.
+    /// Matching names.
     Names(glob::Pattern),
 }
 
@@ -85,17 +85,17 @@ fn is_hidden(name: &OsStr) -> bool {
     name.as_encoded_bytes().starts_with(b".")
 }
 
-/// Whether recordings are looked for in a folder. Links to folders are not followed.
+/// Whether recordings are searched for in a folder. Links to folders are not followed.
 fn is_folder_to_enter(name: &OsStr, path: &Path) -> bool {
     !is_hidden(name) && path.is_dir() && !path.is_symlink()
 }
 
 impl Listing {
-    /// Adds what an argument of the command line means; `is_ours` are the files and folders (with their real paths) that
-    /// no recording is looked for in.
+    /// Adds the recordings that a command-line argument refers to; `is_ours` identifies the files and folders (by their
+    /// real paths) that are excluded.
     ///
     /// # Errors
-    /// If nothing is meant by it.
+    /// If it refers to none.
     pub(super) fn add(
         &mut self,
         input: &Path,
@@ -123,7 +123,7 @@ impl Listing {
         Ok(())
     }
 
-    /// Adds the paths of a list. Below the results they have the folders that the list gives.
+    /// Adds the paths of a list. Their results have the same relative folders as in the list.
     ///
     /// # Errors
     /// If the list cannot be read.
@@ -153,7 +153,7 @@ impl Listing {
         Ok(())
     }
 
-    /// Leaves out what is named twice.
+    /// Removes duplicates.
     pub(super) fn without_repetitions(mut self) -> Self {
         let mut seen = HashSet::new();
         self.files
@@ -183,7 +183,7 @@ impl Listing {
         .at(folder.shown())
     }
 
-    /// Adds the files that a pattern matches; hidden ones only if it names their point.
+    /// Adds the files that match a pattern; hidden ones only if it contains their leading dot.
     fn add_pattern(&mut self, pattern: &Path) -> Result<(), Failure> {
         let parts: Result<Vec<_>, _> = pattern.components().map(PatternPart::of).collect();
         let parts = parts.map_err(|error| {
@@ -205,7 +205,7 @@ impl Listing {
         }
     }
 
-    /// Adds the files in a folder that the rest of a pattern matches.
+    /// Adds the files in a folder that match the rest of a pattern.
     fn add_matching(&mut self, root: &Path, folder: &Path, parts: &[PatternPart]) {
         let Some((part, rest)) = parts.split_first() else {
             if !folder.is_dir() {
@@ -225,7 +225,7 @@ impl Listing {
         }
         let names = match names_in(folder) {
             Ok(names) => names,
-            // Nothing matches below a file, or below what does not exist.
+            // Nothing matches below a file, or below a nonexistent path.
             Err(error)
                 if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) =>
             {
@@ -249,7 +249,7 @@ impl Listing {
         }
     }
 
-    /// Adds the recordings in a folder and those in it.
+    /// Adds the recordings in a folder and its subfolders.
     fn add_folder(&mut self, root: &Path, is_ours: &dyn Fn(&Path) -> bool) {
         let mut files = Vec::new();
         let real = root.canonicalize().unwrap_or_else(|_| root.to_owned());
@@ -293,7 +293,7 @@ impl Listing {
         }
     }
 
-    /// Adds a file by its path below a root.
+    /// Adds a file by its path relative to a root.
     fn add_below(&mut self, root: &Path, path: &Path) {
         let below = path.strip_prefix(root).unwrap_or(path);
         self.push(path, file_name::with_slashes(below));

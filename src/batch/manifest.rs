@@ -1,4 +1,4 @@
-//! What was made from what: a file of JSON lines, appended to durably before the results get their names.
+//! Provenance of results: a JSON-lines file, appended to durably before the results are renamed.
 
 use std::collections::{HashMap, HashSet};
 use std::io;
@@ -15,11 +15,11 @@ use crate::io::{storage, sum};
 use crate::outcome::RecordFigures;
 use crate::warning::Warning;
 
-/// Name and version of a line.
+/// Name and version of the line format.
 pub(crate) const SCHEMA: &str = "torqcomp.manifest/1";
-/// How every manifest begins.
+/// Start of every manifest.
 pub(super) const BEGINNING: &str = "{\"schema\":\"torqcomp.manifest/";
-/// Beginning and end of the name of a manifest in the folder of results.
+/// Start and end of the name of a manifest in the folder of results.
 const NAME: [&str; 2] = ["torqcomp-manifest", ".jsonl"];
 
 /// What one recording became.
@@ -110,7 +110,7 @@ pub(crate) enum ManifestLine {
 }
 
 impl ManifestLine {
-    /// Reads a line; `None` if it is cut, or not of this version.
+    /// Parses a line; `None` if it is truncated, or of another version.
     pub(super) fn read(line: &[u8]) -> Option<Self> {
         let line: Self = serde_json::from_slice(line).ok()?;
         let schema = match &line {
@@ -170,7 +170,7 @@ impl NotedWarning {
 }
 
 impl MadeFrom {
-    /// The sums of a recording and of a stand file.
+    /// Checksums of a recording and of a stand file.
     ///
     /// # Errors
     /// If one of them cannot be read.
@@ -190,7 +190,7 @@ impl MadeFrom {
 }
 
 impl ManifestEntry {
-    /// One of this version that nothing is known of yet.
+    /// An entry of this version without further information.
     pub(super) fn new(made_by: MadeBy, file: &str, input: &str) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
@@ -208,7 +208,7 @@ impl ManifestEntry {
         }
     }
 
-    /// In what another result of the same recording differs, if it does.
+    /// The difference from another result of the same recording, if any.
     pub(super) fn difference(&self, other: &Self) -> Option<&'static str> {
         let differs = [
             (
@@ -263,24 +263,24 @@ impl RunEnd {
     }
 }
 
-/// What manifests say of the results in a folder.
+/// History of the results in a folder, from manifests.
 #[derive(Debug, Default)]
 pub(super) struct History {
-    /// The last entry of each recording and verb; the last of the manifests read counts most.
+    /// The last entry for each recording and command; the manifest read last takes precedence.
     last: HashMap<(String, String), ManifestEntry>,
-    /// Those of them that are in the last of the manifests read.
+    /// Those of them that are in the manifest read last.
     of_last: HashSet<(String, String)>,
-    /// Results that were ever made, and the recordings they were made from.
+    /// All results ever made, and the recordings they were made from.
     made: HashMap<String, HashSet<String>>,
-    /// Lines that could not be read: cut, or not of this kind.
+    /// Number of unreadable lines: truncated, or of another kind.
     pub(super) unread: usize,
 }
 
 impl History {
-    /// Reads manifests; those that are not there say nothing.
+    /// Reads manifests, skipping missing ones.
     ///
     /// # Errors
-    /// If one is there and cannot be read.
+    /// If an existing one cannot be read.
     pub(super) fn read(manifests: &[PathBuf]) -> Result<Self, Failure> {
         let mut history = Self::default();
         for path in manifests {
@@ -311,24 +311,24 @@ impl History {
         self.last.insert(entry.key(), *entry);
     }
 
-    /// Whether the last of the manifests read has an entry of that recording and verb.
+    /// Whether the manifest read last has an entry for that recording and command.
     pub(super) fn is_in_last(&self, entry: &ManifestEntry) -> bool {
         self.of_last.contains(&entry.key())
     }
 
-    /// Results that torqcomp made, by their paths below the folder of the results.
+    /// Results made by torqcomp, by their paths relative to the folder of results.
     pub(super) fn results(&self) -> impl Iterator<Item = &str> {
         self.made.keys().map(String::as_str)
     }
 
-    /// Whether a result was made from the recording of that path before.
+    /// Whether a result was made from the recording at that path before.
     pub(super) fn made(&self, output: &str, input: &str) -> bool {
         let inputs = self.made.get(output);
         inputs.is_some_and(|inputs| inputs.contains(input))
     }
 
-    /// The entry of a recording whose results need not be made again: they are in `folder`, as they were made, by the same
-    /// version, verb and options from the same content, and have the same names.
+    /// The entry of a recording whose results need not be made again: they exist unchanged in `folder`, made by the
+    /// same version, command and options from the same content, and have the same names.
     pub(super) fn standing(
         &self,
         folder: &Path,
@@ -361,7 +361,7 @@ pub(super) fn in_folder(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// The manifest of a folder of results, or of a part of them.
+/// The default manifest of a folder of results, or of a part of them.
 pub(super) fn usual(folder: &Path, shard: Option<Shard>) -> PathBuf {
     let [front, end] = NAME;
     folder.join(match shard {
@@ -370,7 +370,7 @@ pub(super) fn usual(folder: &Path, shard: Option<Shard>) -> PathBuf {
     })
 }
 
-/// Opens a manifest to append to, and makes it if it is not there.
+/// Opens a manifest for appending, creating it if necessary.
 ///
 /// # Errors
 /// If it cannot be written.
@@ -407,7 +407,7 @@ mod tests {
                 .append(print::json_line(&entry))
                 .unwrap();
             let history = History::read(std::slice::from_ref(&path)).unwrap();
-            // A line that lacks its end only is whole.
+            // A line that only lacks its line end is complete.
             assert_eq!(history.unread, usize::from(cut < whole.len() - 1), "{cut}");
             let key = ("compensate".to_owned(), "a/ü x.csv".to_owned());
             assert_eq!(history.last[&key], entry);

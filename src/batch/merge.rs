@@ -1,4 +1,4 @@
-//! The manifests of several runs of one job joined, with all that keeps them from being one.
+//! Merging of the manifests of several runs of one job, with the problems that prevent it.
 
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -16,7 +16,7 @@ use crate::file_name::ShowPath;
 use crate::outcome::Outcome;
 use crate::print::{Report, plural};
 
-/// Digits of a SHA-256 that people compare.
+/// Number of displayed digits of a SHA-256.
 const SUM_DIGITS: usize = 12;
 
 /// What several runs of one job made, together.
@@ -60,7 +60,7 @@ impl MergeProblem {
 }
 
 impl Merged {
-    /// Reads manifests and joins the last run of each.
+    /// Reads manifests and merges the last run of each.
     ///
     /// # Errors
     /// If one of them cannot be read.
@@ -96,10 +96,10 @@ impl Merged {
         })
     }
 
-    /// The table that a run over all recordings writes.
+    /// The table that a single run over all recordings would write.
     ///
     /// # Errors
-    /// If something keeps the runs from being one.
+    /// If a problem prevents merging.
     pub(crate) fn table(&self) -> Result<Vec<u8>, Failure> {
         match self.problems.len() {
             0 => Ok(summary::csv(self.files.iter())),
@@ -113,7 +113,7 @@ impl Merged {
         }
     }
 
-    /// What keeps the runs from being one, a line each.
+    /// The problems that prevent merging, one per line.
     pub(crate) fn problems(&self) -> String {
         let lines = self.problems.iter();
         lines
@@ -121,7 +121,7 @@ impl Merged {
             .collect()
     }
 
-    /// Says which recordings failed or lost data, and how a run over all ends.
+    /// Reports which recordings failed or lost data, and the outcome of a run over all.
     ///
     /// # Errors
     /// If one failed.
@@ -166,7 +166,7 @@ fn no_run(manifest: String) -> MergeProblem {
     }
 }
 
-/// Whether a run was cut off, or ended before its last recording.
+/// Whether a run was interrupted, or ended before its last recording.
 fn unfinished(run: &LastRun) -> Option<MergeProblem> {
     let missing = run.not_done.len();
     let which = match missing {
@@ -190,7 +190,7 @@ fn unfinished(run: &LastRun) -> Option<MergeProblem> {
     })
 }
 
-/// In what the job of a run differs from that of the first.
+/// Difference of a run's job from that of the first.
 fn other_job(first: &LastRun, run: &LastRun) -> Option<MergeProblem> {
     let (begin, other) = (&run.begin, &first.begin);
     let differs = |code, what: &str, this: &str, that: &str| {
@@ -231,7 +231,7 @@ fn other_job(first: &LastRun, run: &LastRun) -> Option<MergeProblem> {
     })
 }
 
-/// Runs with another stand file, by its content, than the first recording that could be read.
+/// Runs with a stand file of different content than that of the first readable recording.
 fn other_stands(runs: &[LastRun]) -> Vec<MergeProblem> {
     let is_read = |entry: &&ManifestEntry| entry.made_from.input_sha256.is_some();
     let mut read = runs
@@ -257,7 +257,7 @@ fn other_stands(runs: &[LastRun]) -> Vec<MergeProblem> {
     runs.iter().filter_map(other).collect()
 }
 
-/// A stand file for people.
+/// A stand file, for messages.
 fn stand_text(made_from: &MadeFrom) -> String {
     match (&made_from.stand, &made_from.stand_sha256) {
         (Some(path), Some(sum)) => {
@@ -268,7 +268,7 @@ fn stand_text(made_from: &MadeFrom) -> String {
     }
 }
 
-/// Parts with recordings that no manifest is about.
+/// Parts with recordings that no manifest covers.
 fn missing_parts(runs: &[LastRun]) -> Option<MergeProblem> {
     let first = runs.first()?;
     let of = first.shard?.of;
@@ -298,7 +298,7 @@ fn missing_parts(runs: &[LastRun]) -> Option<MergeProblem> {
     })
 }
 
-/// The recordings of all runs, each once.
+/// The recordings of all runs, without duplicates.
 struct Joined {
     files: Vec<ManifestEntry>,
     repeated: usize,

@@ -1,7 +1,7 @@
-//! Many recordings through a verb that reads one: which they are, where their results go, what was made from what.
+//! Batch processing: which recordings are selected, where their results go, and the provenance of the results.
 //!
-//! Each recording is worked on as by a run of its own. Before its results get their names, the manifest has a line with
-//! their SHA-256 on the disk: a run that is killed goes on where it was, and nothing is there that no line explains.
+//! Each recording is processed as by a separate run. Before its results are renamed, a manifest line with their SHA-256
+//! is synced: a killed run can be resumed, and every existing result has a line.
 
 mod content;
 mod last_run;
@@ -39,15 +39,15 @@ use crate::outcome::{Made, Outcome};
 use crate::progress::{Amount, Progress, Task};
 use crate::{log, parallel, print};
 
-/// What a verb is asked to do with many recordings.
+/// A command applied to many recordings.
 pub(crate) struct BatchTask<'a> {
     pub(crate) verb: &'static str,
     pub(crate) inputs: &'a [PathBuf],
     pub(crate) many: &'a BatchOptions,
     pub(crate) result: &'a OutputArgs,
-    /// Template of the names of its results, unless another is asked for.
+    /// Default template of the names of its results.
     pub(crate) name: &'static str,
-    /// Options of outputs beside the result, with their templates.
+    /// Options for additional outputs, with their templates.
     pub(crate) beside: Vec<(&'static str, &'a Path)>,
     pub(crate) stand: Option<&'a Path>,
     /// Whether the table is printed as a JSON document.
@@ -56,21 +56,21 @@ pub(crate) struct BatchTask<'a> {
     pub(crate) makes_json: bool,
 }
 
-/// What a verb is to do with one of them.
+/// Processing of one of them.
 pub(crate) struct OneRun<'a> {
     pub(crate) input: &'a Path,
-    /// The result, then those beside it.
+    /// The main result, then the additional ones.
     pub(crate) outputs: &'a [PathBuf],
-    /// Whether these are replaced if they are there.
+    /// Whether existing files are replaced.
     pub(crate) replace: bool,
-    /// Threads, unless a number is asked for.
+    /// Default number of threads.
     pub(crate) threads: usize,
 }
 
-/// The verb, on one recording.
+/// The command, for one recording.
 type OnOne<'a> = dyn Fn(&OneRun) -> Result<Made, Failure> + Sync + 'a;
 
-/// Whether these arguments ask for many recordings, each by itself.
+/// Whether these arguments request many recordings, each processed separately.
 pub(crate) fn is_asked(inputs: &[PathBuf], many: &BatchOptions, result: &OutputArgs) -> bool {
     let output = result.output.as_deref();
     many.is_asked()
@@ -78,15 +78,15 @@ pub(crate) fn is_asked(inputs: &[PathBuf], many: &BatchOptions, result: &OutputA
         || (output.is_some_and(Path::is_dir) && is_several(inputs))
 }
 
-/// Whether these are several recordings, or may be.
+/// Whether these are, or may be, several recordings.
 pub(crate) fn is_several(inputs: &[PathBuf]) -> bool {
     inputs.len() > 1 || inputs.iter().any(|input| list::is_several(input))
 }
 
-/// Paths with folders and patterns in the place of which stand the recordings that they mean.
+/// Paths with folders and patterns replaced by the recordings that they refer to.
 ///
 /// # Errors
-/// If one of them means none.
+/// If one of them refers to none.
 pub(crate) fn expand(inputs: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut paths = Vec::new();
     for input in inputs {
@@ -101,7 +101,7 @@ pub(crate) fn expand(inputs: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     Ok(paths)
 }
 
-/// Paths of manifests: those of a folder or pattern in its place, each once.
+/// Paths of manifests, with folders and patterns replaced by theirs, without duplicates.
 ///
 /// # Errors
 /// If a folder or pattern has none.
@@ -127,10 +127,10 @@ pub(crate) fn manifests(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     Ok(found)
 }
 
-/// Runs a verb over many recordings; `options` are those that its results may depend on.
+/// Runs a command on many recordings; `options` are those that its results may depend on.
 ///
 /// # Errors
-/// If nothing could be begun, or some recordings failed.
+/// If the run could not start, or some recordings failed.
 pub(crate) fn run(
     task: &BatchTask,
     options: &[String],
@@ -174,7 +174,7 @@ pub(crate) fn run(
     .conclude(summary)
 }
 
-/// What would be done, a line for each recording.
+/// What would be done, one line per recording.
 fn dry_run(plan: &BatchPlan) -> String {
     let line = |file: &BatchFile| {
         let outputs: Vec<PathBuf> = file.outputs.iter().map(|o| plan.result(o)).collect();
@@ -188,7 +188,7 @@ fn dry_run(plan: &BatchPlan) -> String {
     plan.files.iter().map(line).collect()
 }
 
-/// Opens the table of all recordings. With `--skip-existing`, that of a run before is replaced.
+/// Opens the table of all recordings. With `--skip-existing`, that of a previous run is replaced.
 fn open_summary(task: &BatchTask) -> Result<Option<Output>, Failure> {
     let Some(path) = task.many.summary.as_deref() else {
         return Ok(None);
@@ -199,7 +199,7 @@ fn open_summary(task: &BatchTask) -> Result<Option<Output>, Failure> {
     Output::open(Some(path), policy, &taken).map(Some)
 }
 
-/// The work while it is under way.
+/// State of the running work.
 struct Running<'a> {
     plan: &'a BatchPlan<'a>,
     on_one: &'a OnOne<'a>,
@@ -208,12 +208,12 @@ struct Running<'a> {
     all: Amount,
 }
 
-/// What the workers share.
+/// State shared by the workers.
 struct Shared {
     progress: Progress,
     done: Amount,
     failures: u32,
-    /// Why nothing can go on.
+    /// Reason to stop everything.
     broken: Option<Failure>,
 }
 
@@ -222,14 +222,14 @@ impl Running<'_> {
         self.shared.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether no other recording is begun.
+    /// Whether no further recording is started.
     fn is_over(&self) -> bool {
         let shared = self.lock();
         let most = self.plan.task.many.most_failures();
         shared.broken.is_some() || most.is_some_and(|most| shared.failures >= most)
     }
 
-    /// Says in the manifest that no recording is under way any more.
+    /// Records in the manifest that the run has ended.
     fn end(&self, treated: &[Option<Treated>]) -> Result<(), Failure> {
         let mut shared = self.lock();
         if let Some(failure) = shared.broken.take() {
@@ -246,7 +246,7 @@ impl Running<'_> {
         self.manifest.append(print::json_line(&end))
     }
 
-    /// Does what is to be done with a recording; `None` if it is not begun.
+    /// Processes a recording; `None` if it is not started.
     fn treat(&self, file: &BatchFile) -> Option<Treated> {
         if self.is_over() {
             return None;
@@ -273,7 +273,7 @@ impl Running<'_> {
         Some(treated)
     }
 
-    /// Makes the results of a recording, unless they are there.
+    /// Makes the results of a recording, unless they exist.
     fn make(
         &self,
         file: &BatchFile,
@@ -286,7 +286,7 @@ impl Running<'_> {
         }
         entry.made_from = MadeFrom::read(&file.found.path, plan.task.stand)?;
         if let Some(standing) = plan.standing(file, entry) {
-            // Each manifest says all of what its last run was about.
+            // Each manifest describes its last run completely.
             if !plan.history.is_in_last(standing) {
                 self.note(standing);
             }
@@ -317,14 +317,15 @@ impl Running<'_> {
         Ok(Treated::Made(entry.clone()))
     }
 
-    /// Adds a line to the manifest; whether that went well. Without it, no result gets its name.
+    /// Appends a line to the manifest; returns whether that succeeded. Without it, no result is
+    /// renamed.
     fn note(&self, entry: &ManifestEntry) -> bool {
         let shared = self.lock();
         let added = match shared.broken {
             None => self.manifest.add(print::json_line(&entry)),
             Some(_) => return false,
         };
-        // The others add theirs while this one gets on the disk.
+        // The others append theirs while this one is synced.
         drop(shared);
         let settled = added.and_then(|()| self.manifest.settle());
         let mut shared = self.lock();
@@ -335,7 +336,7 @@ impl Running<'_> {
     }
 }
 
-/// The results with their sums, by their paths below the folder.
+/// The results with their checksums, by their paths relative to the folder.
 fn sums(outputs: &[Output], folder: &Path) -> Result<Vec<OutputSum>, Failure> {
     let each = outputs.iter().map(|output| {
         let unreadable = |error| Failure::reading(output.place(), &error);

@@ -1,4 +1,4 @@
-//! Which results each recording has, before anything is written.
+//! Plan of the results of each recording, made before anything is written.
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -11,14 +11,14 @@ use crate::file_name::{self, ShowPath, is_dash};
 use crate::io::output::end_of_links;
 use crate::parallel::cores;
 
-/// What is asked where several recordings have no folder for their results.
+/// Question if several recordings have no folder for their results.
 pub(crate) const NEED_FOLDER: &str =
     "the results of several recordings need a folder; give -o FOLDER/";
 
-/// All that is settled before the first recording is read.
+/// Everything decided before the first recording is read.
 pub(super) struct BatchPlan<'a> {
     pub(super) task: &'a BatchTask<'a>,
-    /// Where the results go.
+    /// Folder of the results.
     pub(super) folder: PathBuf,
     pub(super) manifest: PathBuf,
     pub(super) history: History,
@@ -26,11 +26,12 @@ pub(super) struct BatchPlan<'a> {
     /// All recordings, of which `files` may be a part.
     pub(super) all: WholeList,
     pub(super) files: Vec<BatchFile>,
-    /// Files of folders that are no recordings by their content.
+    /// Files of folders that are not recordings by their content.
     pub(super) left_out: Vec<String>,
 }
 
-/// A recording and the names of its results below their folder: the result proper, then those beside it.
+/// A recording and the names of its results relative to their folder: the main result, then the
+/// additional ones.
 pub(super) struct BatchFile {
     pub(super) found: FoundFile,
     pub(super) outputs: Vec<String>,
@@ -39,7 +40,7 @@ pub(super) struct BatchFile {
 
 impl<'a> BatchPlan<'a> {
     /// # Errors
-    /// If the results have no folder, or two recordings would have the same result.
+    /// If no folder is given for the results, or two recordings would have the same result.
     pub(super) fn new(task: &'a BatchTask<'a>, options: &[String]) -> Result<Self, Failure> {
         let folder = folder(task)?;
         let manifest = match &task.many.manifest {
@@ -47,7 +48,7 @@ impl<'a> BatchPlan<'a> {
             None => manifest::usual(&folder, task.many.shard),
         };
         let mut manifests = manifest::in_folder(&folder);
-        // Its own counts most.
+        // Its own takes precedence.
         manifests.retain(|other| *other != manifest);
         manifests.push(manifest.clone());
         let history = History::read(&manifests)?;
@@ -82,7 +83,7 @@ impl<'a> BatchPlan<'a> {
         Ok(plan)
     }
 
-    /// The recordings that are meant.
+    /// The selected recordings.
     fn list(&self) -> Result<Listing, Failure> {
         let task = self.task;
         let results = self.history.results().map(|name| self.result(name));
@@ -108,7 +109,7 @@ impl<'a> BatchPlan<'a> {
         Ok(listing.without_repetitions())
     }
 
-    /// Names the results of a recording.
+    /// Assigns names to the results of a recording.
     fn assign(&self, found: FoundFile) -> Result<BatchFile, Failure> {
         let task = self.task;
         let name = task.many.name.as_deref().unwrap_or(task.name);
@@ -132,7 +133,7 @@ impl<'a> BatchPlan<'a> {
         })
     }
 
-    /// Refuses two recordings with the same result, and a result in the place of a recording.
+    /// Rejects two recordings with the same result, and a result that would replace a recording.
     fn check_names(&self) -> Result<(), Failure> {
         let mut owners: HashMap<&str, &Path> = HashMap::new();
         let path = |file: &'_ BatchFile| file.found.path.clone();
@@ -180,13 +181,13 @@ impl<'a> BatchPlan<'a> {
         )
     }
 
-    /// What is known of a recording beforehand.
+    /// The known part of the entry of a recording.
     pub(super) fn entry(&self, file: &BatchFile) -> ManifestEntry {
         let FoundFile { path, relative, .. } = &file.found;
         ManifestEntry::new(self.made_by.clone(), relative, &path.shown().to_string())
     }
 
-    /// The entry of results that need not be made again, if such are asked for.
+    /// The entry of results that need not be made again, if they may be reused.
     pub(super) fn standing(
         &self,
         file: &BatchFile,
@@ -196,7 +197,7 @@ impl<'a> BatchPlan<'a> {
         history.standing(&self.folder, &file.outputs, wanted)
     }
 
-    /// Whether results that are there are replaced: with `--force`, or if they came from this recording by a run before.
+    /// Whether existing results are replaced: with `--force`, or if a previous run made them from this recording.
     pub(super) fn may_replace(&self, file: &BatchFile) -> bool {
         let input = file.found.path.shown().to_string();
         let is_known =
@@ -210,7 +211,7 @@ impl<'a> BatchPlan<'a> {
         self.folder.join(file_name::path_of(output))
     }
 
-    /// What will be done with a recording, in a word.
+    /// The planned action for a recording, as a word.
     pub(super) fn intent(&self, file: &BatchFile) -> &'static str {
         let mut wanted = self.entry(file);
         let read = match &file.found.problem {
@@ -233,7 +234,7 @@ impl<'a> BatchPlan<'a> {
         }
     }
 
-    /// Recordings worked on at a time.
+    /// Number of recordings processed at a time.
     pub(super) fn workers(&self) -> usize {
         let allowed = match self.task.many.jobs {
             Some(jobs) => usize::from(jobs),
@@ -242,7 +243,7 @@ impl<'a> BatchPlan<'a> {
         allowed.min(self.files.len()).max(1)
     }
 
-    /// Threads for each of them.
+    /// Number of threads for each of them.
     pub(super) fn threads(&self) -> usize {
         (cores() / self.workers()).max(1)
     }
@@ -266,7 +267,7 @@ fn folder(task: &BatchTask) -> Result<PathBuf, Failure> {
     }
 }
 
-/// The path that a template gives the result of a recording.
+/// The path of a recording's result according to a template.
 fn named(template: &str, relative: &str) -> String {
     let (folder, name) = match relative.rsplit_once('/') {
         Some((folder, name)) => (format!("{folder}/"), name),
@@ -276,7 +277,7 @@ fn named(template: &str, relative: &str) -> String {
         Some((stem, ext)) if !stem.is_empty() => (stem, ext),
         _ => (name, ""),
     };
-    // Braces in the name of a recording are no placeholders.
+    // Braces in the name of a recording are not placeholders.
     let mut parts = template.split('{');
     let mut text = folder + parts.next().unwrap_or_default();
     for part in parts {

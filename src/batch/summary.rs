@@ -1,4 +1,4 @@
-//! What became of all recordings: a table for people, a CSV file, a JSON document, and how the run ended.
+//! Results for all recordings: a text table, a CSV file, a JSON document, and the outcome of the run.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -32,9 +32,9 @@ const HEADINGS: [&str; 12] = [
     "codes",
     "error",
 ];
-/// Significant digits in it.
+/// Significant digits in the CSV file.
 const DIGITS: u32 = 12;
-/// Most files of one kind whose names are said.
+/// Maximum number of files of one kind that are listed.
 const LISTED: usize = 10;
 
 /// Name and version of the document of a run.
@@ -78,7 +78,7 @@ impl Treated {
     }
 }
 
-/// How the table of a run begins.
+/// Start of the table of a run.
 pub(super) fn beginning() -> String {
     HEADINGS.join(",")
 }
@@ -92,10 +92,10 @@ pub(super) fn is_one(path: &Path) -> bool {
     read.is_ok() && head == beginning.as_bytes()
 }
 
-/// What became of all recordings.
+/// Results for all recordings.
 pub(super) struct BatchResult<'a> {
     pub(super) plan: &'a BatchPlan<'a>,
-    /// In the order of the recordings; `None` for those that were not begun.
+    /// In the order of the recordings; `None` for those that were not started.
     pub(super) treated: Vec<Option<Treated>>,
     pub(super) seconds: f64,
 }
@@ -128,7 +128,7 @@ pub(crate) struct BatchReport<'a> {
 }
 
 impl BatchResult<'_> {
-    /// Writes the tables and tells how the run ended.
+    /// Writes the tables and returns the outcome of the run.
     ///
     /// # Errors
     /// If a recording failed, or a table cannot be written.
@@ -181,7 +181,7 @@ impl BatchResult<'_> {
         }
     }
 
-    /// The table, and what holds for all.
+    /// The table, and information common to all recordings.
     fn text(&self) -> String {
         let headings = [
             "file", "samples", "rate/Hz", "band/Hz", "rms", "peak", "noise", "unit", "warnings",
@@ -236,12 +236,12 @@ impl BatchResult<'_> {
     }
 }
 
-/// How many of them failed.
+/// Number of failed recordings.
 pub(super) fn failed<'a>(entries: impl Iterator<Item = &'a ManifestEntry>) -> usize {
     entries.filter(|entry| entry.has_failed()).count()
 }
 
-/// Says which recordings failed or lost data, and how a run with these ends.
+/// Reports which recordings failed or lost data, and the resulting outcome of a run.
 ///
 /// # Errors
 /// If one failed.
@@ -272,7 +272,7 @@ pub(super) fn ended<'a>(
     }
 }
 
-/// How many recordings each warning concerns; `place` is where their words are.
+/// Number of recordings concerned by each warning; `place` says where the full texts are.
 pub(super) fn warnings<'a>(
     entries: impl Iterator<Item = &'a ManifestEntry>,
     place: &str,
@@ -310,7 +310,7 @@ fn failures<'a>(entries: impl Iterator<Item = &'a ManifestEntry>) -> String {
     entries.filter(|entry| entry.exit != 0).map(line).collect()
 }
 
-/// The first of so many names, and how many more there are.
+/// The first of `count` names, and the number of further ones.
 pub(super) fn some_of<T: ToString>(names: impl IntoIterator<Item = T>, count: usize) -> String {
     let more = match count.saturating_sub(LISTED) {
         0 => String::new(),
@@ -321,7 +321,7 @@ pub(super) fn some_of<T: ToString>(names: impl IntoIterator<Item = T>, count: us
     format!("{}{more}", first.join(", "))
 }
 
-/// How a recording ended.
+/// The outcome of a recording, as a word.
 fn word(exit: u8) -> &'static str {
     match exit {
         0 => "done",
@@ -330,7 +330,7 @@ fn word(exit: u8) -> &'static str {
     }
 }
 
-/// The different codes of warnings, in their order.
+/// The distinct codes of warnings, in order.
 fn codes(warnings: &[NotedWarning]) -> Vec<&str> {
     let mut codes: Vec<&str> = Vec::new();
     for warning in warnings {
@@ -341,7 +341,7 @@ fn codes(warnings: &[NotedWarning]) -> Vec<&str> {
     codes
 }
 
-/// A row of the table for people; unknown figures are `-`.
+/// A row of the text table; unknown values are `-`.
 fn row(treated: &Treated) -> Vec<String> {
     let entry = treated.entry();
     let figures = &entry.figures;
@@ -367,8 +367,8 @@ fn row(treated: &Treated) -> Vec<String> {
     ]
 }
 
-/// The table as CSV, in the order of folders and names. It has no times, so that the same recordings give the same bytes,
-/// in one run or merged from several.
+/// The table as CSV, in the order of folders and names. It contains no times, so that the same recordings give the same
+/// bytes, whether in one run or merged from several.
 pub(super) fn csv<'a>(entries: impl Iterator<Item = &'a ManifestEntry>) -> Vec<u8> {
     let mut entries: Vec<&ManifestEntry> = entries.collect();
     entries.sort_by(|a, b| a.file.split('/').cmp(b.file.split('/')));
@@ -377,7 +377,7 @@ pub(super) fn csv<'a>(entries: impl Iterator<Item = &'a ManifestEntry>) -> Vec<u
     rows.write_record(HEADINGS).expect(written);
     for entry in entries {
         let figures = &entry.figures;
-        // As in a manifest, what is not finite is unknown.
+        // As in a manifest, non-finite values are unknown.
         let text = |value: Option<f64>| {
             let value = value.filter(|v| v.is_finite());
             value.map_or_else(String::new, |v| rounded(v, DIGITS))

@@ -1,11 +1,11 @@
-//! The range of an axis, linear or logarithmic, and the values marked along it.
+//! Range of an axis, linear or logarithmic, and its ticks.
 
-/// Decades of a logarithmic axis at most.
+/// Maximum decades of a logarithmic axis.
 const MOST_DECADES: f64 = 12.0;
-/// Decades above which a logarithmic axis is marked at powers of ten.
+/// Decades above which a logarithmic axis has ticks at powers of ten.
 const LONG: f64 = 1.2;
 
-/// A range of values, as logarithms if the axis is logarithmic.
+/// A range of values, or of their logarithms on a logarithmic axis.
 #[derive(PartialEq)]
 pub(super) struct Axis {
     low: f64,
@@ -14,8 +14,8 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// The range of the values that can be drawn, with a share `room` of it added at both ends. `None` if there are no
-    /// such values.
+    /// Range of the values that can be drawn, extended by a fraction `room` at both ends. `None` if there are no such
+    /// values.
     pub(super) fn over(values: impl Iterator<Item = f64>, log: bool, room: f64) -> Option<Self> {
         let place = |v: f64| if log { v.log10() } else { v };
         let (low, high) = values
@@ -58,7 +58,7 @@ impl Axis {
         (place - self.low) / (self.high - self.low)
     }
 
-    /// About `count` values to mark: 1, 2 or 5 times powers of ten; on a long logarithmic axis the powers alone.
+    /// About `count` ticks: 1, 2 or 5 times powers of ten; on a long logarithmic axis the powers alone.
     pub(super) fn marks(&self, count: f64) -> Vec<f64> {
         if self.log && self.high - self.low > LONG {
             return self.powers(count);

@@ -1,10 +1,10 @@
-//! Long series reduced to what a picture can show: their extremes.
+//! Reduction of long series to their extremes, as far as a picture can show.
 
 use super::Point;
 
-/// Columns that a long series is reduced to.
+/// Number of columns that a long series is reduced to.
 pub(super) const COLUMNS: usize = 900;
-/// Most bins of an envelope, an even number.
+/// Maximum number of bins of an envelope, even.
 const MOST_BINS: usize = 4096;
 
 /// The first, lowest, highest and last point of each run of points in the same column, in their order.
@@ -40,7 +40,7 @@ pub(super) fn thinned(
     out
 }
 
-/// The extremes of a series of unknown length, gathered sample by sample in bounded memory.
+/// Extremes of a series of unknown length, gathered sample by sample in bounded memory.
 #[derive(Debug, Clone)]
 pub(crate) struct Envelope {
     bins: Vec<Bin>,
@@ -90,7 +90,7 @@ impl Envelope {
                 self.in_last = 1;
             }
         }
-        // Full bins are joined in pairs, so that all stay of one width.
+        // Full bins are merged in pairs, so that all keep the same width.
         if self.bins.len() == MOST_BINS && self.in_last == self.samples_per_bin {
             let pairs = self.bins.chunks(2).map(|pair| pair[0].join(pair[1]));
             self.bins = pairs.collect();
@@ -103,7 +103,7 @@ impl Envelope {
         self.bins.is_empty()
     }
 
-    /// The lowest and highest point of each bin in their order, as a line: all points of a short series.
+    /// The lowest and highest point of each bin in their order, as a line; all points of a short series.
     pub(crate) fn points(&self) -> Vec<Point> {
         let ends = |bin: &Bin| {
             let (first, last) = match bin.low.0 <= bin.high.0 {

@@ -1,5 +1,5 @@
-//! Charts as SVG that needs nothing else: lines, dots and bands over linear or logarithmic axes, for light, dark and
-//! paper. [`picture`] makes a file of charts one above the other; [`Page`] sets charts among text.
+//! Self-contained SVG charts: lines, dots and bands over linear or logarithmic axes, for light and dark screens and
+//! paper. [`picture`] makes a file of stacked charts; [`Page`] combines charts with text.
 
 mod axis;
 mod envelope;
@@ -24,13 +24,13 @@ const TITLE: f64 = 30.0;
 /// Width of a chart on a page, and height of its panel.
 const PAGE_WIDTH: f64 = 720.0;
 const PAGE_PANEL: f64 = 224.0;
-/// Colours of series.
+/// Number of colours for series.
 const COLOURS: usize = 5;
-/// Columns that a dense line may leave empty; more are a gap.
+/// Number of columns that a dense line may leave empty; more are a gap.
 const BRIDGED: f64 = 3.0;
 
-/// Style of all charts. The colours of the series are readable in grey and by the colour-blind. A screen in the dark
-/// has colours of its own; paper has not.
+/// Style of all charts. The colours of the series are distinguishable in greyscale and by the colour-blind. Dark
+/// screens have their own colours; paper does not.
 const STYLE: &str = "\
 text{font:12px system-ui,sans-serif;fill:#222}.name{font-weight:600}\
 .paper{fill:#fff}.grid{stroke:#ddd}.frame{fill:none;stroke:#888}\
@@ -55,15 +55,15 @@ pub(crate) struct Chart {
     pub(crate) series: Vec<Series>,
     /// An area behind the series, in the colour of the first: x, low, high.
     pub(crate) band: Vec<(f64, f64, f64)>,
-    /// Heights marked by dashed lines.
+    /// Levels marked by dashed lines.
     pub(crate) rails: Vec<f64>,
-    /// Stretches along x that are marked.
+    /// Highlighted intervals along x.
     pub(crate) spans: Vec<MarkedSpan>,
-    /// Colour of the first series: what is the same on several charts has the same colour on all of them.
+    /// Colour of the first series, so that the same quantity has the same colour on several charts.
     pub(crate) first_colour: usize,
 }
 
-/// A stretch along x that means something.
+/// A highlighted interval along x.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct MarkedSpan {
     pub(crate) from: f64,
@@ -71,19 +71,19 @@ pub(crate) struct MarkedSpan {
     pub(crate) kind: SpanKind,
 }
 
-/// What a stretch along x means.
+/// Meaning of an interval along x.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum SpanKind {
     /// Samples that were filled in.
     Filled,
-    /// Results that depend on such samples.
+    /// Results that depend on filled samples.
     Smeared,
-    /// Frequencies that are compensated.
+    /// Compensated frequencies.
     Band,
 }
 
 impl SpanKind {
-    /// All kinds, those that lie below others first.
+    /// All kinds, in drawing order.
     const ALL: [Self; 3] = [Self::Band, Self::Smeared, Self::Filled];
 
     fn class(self) -> &'static str {
@@ -108,9 +108,9 @@ impl SpanKind {
 pub(crate) struct Series {
     /// Name in the legend.
     pub(crate) name: String,
-    /// Points; a line is interrupted where y is NaN.
+    /// Points; the line is interrupted where y is NaN.
     pub(crate) points: Vec<Point>,
-    /// Dots instead of a line.
+    /// Whether to draw dots instead of a line.
     pub(crate) dots: bool,
     /// Longest distance along x that the line bridges.
     pub(crate) bridged: f64,
@@ -139,8 +139,8 @@ impl Series {
         }
     }
 
-    /// A line through the samples of a recording over a range of x; many samples are reduced to the extremes in each
-    /// column of the picture as they are taken, and gaps among them interrupt the line.
+    /// A line through the samples of a recording over a range of x; many samples are reduced on the fly to the
+    /// extremes in each column of the picture, and gaps interrupt the line.
     pub(crate) fn recorded(points: impl ExactSizeIterator<Item = Point>, range: Point) -> Self {
         let columns = envelope::COLUMNS as f64;
         let width = (range.1 - range.0) / columns;
@@ -167,7 +167,7 @@ impl Chart {
         }
     }
 
-    /// The kinds of spans that it has.
+    /// The kinds of spans present.
     fn span_kinds(&self) -> impl Iterator<Item = SpanKind> {
         let has = |kind: &SpanKind| self.spans.iter().any(|s| s.kind == *kind);
         SpanKind::ALL.into_iter().filter(has)
@@ -177,7 +177,7 @@ impl Chart {
         (self.first_colour + series) % COLOURS
     }
 
-    /// Title and label of y, above the panel.
+    /// Title and y label, above the panel.
     fn heading(&self, drawable: bool) -> Markup {
         html! {
             text x=(LEFT) y=(px(HEADING - 7.0)) {
@@ -205,8 +205,7 @@ impl Chart {
     }
 }
 
-/// A file with the charts one above the other, their panels of the same height. Charts that follow each other with the
-/// same range of x share its labels.
+/// A file of stacked charts with panels of equal height. Consecutive charts with the same range of x share its labels.
 pub(crate) fn picture(title: &str, panel_height: f64, charts: &[Chart]) -> String {
     let panel = |chart| Panel::new(chart, (FILE_WIDTH, panel_height), Resolution::FILE);
     let panels: Vec<Option<Panel>> = charts.iter().map(panel).collect();

@@ -1,5 +1,4 @@
-//! A page for a browser: one file, nothing loaded from elsewhere, for screens of any width, in light
-//! and dark, and on paper.
+//! A self-contained HTML page for screens of any width, in light and dark, and for paper.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -8,10 +7,10 @@ use crate::print::visible;
 
 /// Style of the page.
 const STYLE: &str = include_str!("page.css");
-/// Zoom and values under the cursor; without it the charts stay as they are.
+/// Zoom and values under the cursor; without it the charts are static.
 const SCRIPT: &str = include_str!("zoom.js");
 
-/// Letters of the longest cell above which a column holds sentences.
+/// Length of the longest cell above which a column contains prose.
 const PROSE: usize = 36;
 
 /// A page under construction.
@@ -22,7 +21,7 @@ pub(crate) struct Page {
 }
 
 impl Page {
-    /// A page with its heading only.
+    /// A page with a heading only.
     pub(crate) fn new(title: &str) -> Self {
         Self {
             title: title.to_owned(),
@@ -44,7 +43,7 @@ impl Page {
             .push(html! { p.warn { code { (code) } " " (message) } });
     }
 
-    /// Names with their values.
+    /// A list of names with values.
     pub(crate) fn facts(&mut self, facts: &[[String; 2]]) {
         self.body.push(html! {
             dl {
@@ -53,12 +52,12 @@ impl Page {
         });
     }
 
-    /// A text with its lines as they are.
+    /// Preformatted text.
     pub(crate) fn preformatted(&mut self, text: &str) {
         self.body.push(html! { pre { (text) } });
     }
 
-    /// Parts that a reader unfolds; paper shows them.
+    /// A collapsible section, expanded in print.
     pub(crate) fn folded(&mut self, summary: &str, build: impl FnOnce(&mut Self)) {
         let mut inside = Self::default();
         build(&mut inside);
@@ -70,8 +69,8 @@ impl Page {
         });
     }
 
-    /// A table; the first row is its head. A column of sentences is set as text, one of numbers to the right; on a narrow
-    /// screen a table with sentences has its cells one below the other.
+    /// A table with a header row. A column of prose is set as text, one of numbers right-aligned; on a narrow screen a
+    /// table with prose has its cells stacked.
     pub(crate) fn table(&mut self, rows: &[Vec<String>]) {
         let Some((head, rows)) = rows.split_first() else {
             return;
@@ -103,7 +102,7 @@ impl Page {
         });
     }
 
-    /// A chart under its title and legend.
+    /// A chart with title and legend.
     pub(crate) fn chart(&mut self, chart: &Chart) {
         self.body.push(html! {
             figure {
@@ -139,7 +138,7 @@ impl Page {
     }
 }
 
-/// The legend of a chart as text: the page breaks it into lines as wide as the screen.
+/// The legend of a chart as text, so that the page can wrap it.
 fn key(chart: &Chart) -> Markup {
     let mark = |series: &Series, k: usize| {
         let colour = format!("s{}", chart.colour(k));

@@ -1,4 +1,4 @@
-//! One chart drawn into its part of a picture: axes, marks, bands, lines and dots.
+//! Drawing of one chart into its part of a picture: axes, ticks, bands, lines and dots.
 
 use std::fmt::Write;
 use torqcomp_dsp::sort_by_number;
@@ -15,38 +15,38 @@ pub(super) const LEFT: f64 = 78.0;
 pub(super) const RIGHT: f64 = 22.0;
 pub(super) const HEADING: f64 = 26.0;
 pub(super) const FOOT: f64 = 44.0;
-/// Height below which a panel has fewer marks.
+/// Height below which a panel has fewer ticks.
 const LOW: f64 = 200.0;
-/// Significant digits of a mark.
+/// Significant digits of a tick label.
 const DIGITS: u32 = 9;
-/// Distance between spans that is not drawn, and width of the shortest.
+/// Gap between spans that is not drawn, and width of the shortest.
 const CLOSE: f64 = 0.5;
-/// Width of an entry of the legend.
+/// Width of a legend entry.
 const ENTRY: f64 = 150.0;
 
-/// How fine a picture is.
+/// Resolution of a picture.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Resolution {
-    /// Columns that a long series is reduced to.
+    /// Number of columns that a long series is reduced to.
     columns: usize,
-    /// Steps of a position in a user unit.
+    /// Steps of a position per user unit.
     steps: f64,
 }
 
 impl Resolution {
-    /// Of what is seen as a whole.
+    /// For a static picture.
     pub(super) const FILE: Self = Self {
         columns: COLUMNS,
         steps: 10.0,
     };
-    /// Of what a reader can zoom into.
+    /// For a chart that can be zoomed.
     pub(super) const PAGE: Self = Self {
         columns: 2048,
         steps: 100.0,
     };
 }
 
-/// A chart and where it lies in the picture.
+/// A chart and its position in the picture.
 pub(super) struct Panel<'a> {
     chart: &'a Chart,
     resolution: Resolution,
@@ -76,7 +76,7 @@ impl<'a> Panel<'a> {
         })
     }
 
-    /// Whether both have the same axis of x.
+    /// Whether both have the same x axis.
     pub(super) fn shares_x_with(&self, other: &Self) -> bool {
         self.x == other.x && self.chart.x_label == other.chart.x_label
     }
@@ -89,7 +89,7 @@ impl<'a> Panel<'a> {
         self.bottom - self.y.part(y) * (self.bottom - HEADING)
     }
 
-    /// The panel; `labelled` also writes the marks and the label of x.
+    /// The panel; with `labelled` including the tick labels and label of x.
     pub(super) fn markup(&self, labelled: bool) -> Markup {
         let (left, right) = (px(LEFT), px(self.right));
         html! {
@@ -136,8 +136,7 @@ impl<'a> Panel<'a> {
         }
     }
 
-    /// Both axes for the script of a page: the frame in user units, and the values at its ends, as logarithms where so
-    /// drawn.
+    /// Both axes for the script of a page: the frame in user units, and the values at its ends, or their logarithms.
     pub(super) fn axes(&self) -> String {
         let frame = [LEFT, self.right, HEADING, self.bottom].map(px).join(" ");
         format!("{frame} {} {}", self.x.ends(), self.y.ends())
@@ -161,7 +160,7 @@ impl<'a> Panel<'a> {
                 .map(place)
                 .collect();
             sort_by_number(&mut all, |(start, _)| *start);
-            // What overlaps or nearly does is one.
+            // Spans that (nearly) overlap are merged.
             all.dedup_by(|later, first| {
                 let joins = later.0 <= first.1 + CLOSE;
                 if joins {
@@ -174,7 +173,7 @@ impl<'a> Panel<'a> {
         html! {
             @for kind in SpanKind::ALL {
                 @for (from, to) in places(kind) {
-                    // A short one is seen too.
+                    // A short one remains visible.
                     rect.(kind.class()) x=(px(from)) y=(px(HEADING)) width=(px((to - from).max(CLOSE))) height=(px(self.bottom - HEADING)) {}
                     "\n"
                 }
@@ -224,7 +223,7 @@ impl<'a> Panel<'a> {
         html! { path.line.(class) d=(line) {} "\n" }
     }
 
-    /// Names of several series and of spans beside a piece of each, above the panel to the right.
+    /// Names of several series and of spans with a sample of each, above the panel to the right.
     pub(super) fn legend(&self) -> Markup {
         let (series, kinds) = (&self.chart.series, self.chart.span_kinds());
         let kinds: Vec<SpanKind> = kinds.collect();
@@ -254,7 +253,7 @@ pub(super) fn px(value: f64) -> String {
     format!("{value:.1}")
 }
 
-/// A line through the places, rounded to `steps` in a unit; the pen is lifted where one is not finite and over distances
+/// A line through points rounded to 1/`steps` of a unit; the pen is lifted where one is not finite and over distances
 /// above `bridged`.
 fn path(places: impl Iterator<Item = Point>, bridged: f64, steps: f64) -> String {
     let mut text = String::new();

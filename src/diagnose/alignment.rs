@@ -1,7 +1,7 @@
-//! Channels whose samples do not belong to the same instants: one is late, or each has a clock of its own.
+//! Channels sampled at different instants: one is delayed, or each has its own clock.
 //!
-//! The measured channel is compared with what a plain stand makes of the applied one: the lag of their correlation is the shift
-//! of the channels, and its growth along the record the difference of their clocks.
+//! The measured channel is compared with the response of a plain stand to the applied one: the lag of their
+//! cross-correlation is the shift of the channels, and its growth along the record the difference of their clocks.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -17,50 +17,50 @@ use super::score::ScoredModel;
 use super::structure::{FitContext, PlainStand, Structure};
 use torqcomp_dsp::dot;
 
-/// Parts of a record in which the shift is looked for one by one.
+/// Number of parts of a record with a separate estimate of the shift.
 const PARTS: usize = 8;
 /// Minimum length of such a part, in samples.
 const SHORTEST_PART: usize = 256;
-/// Rounds in which stand and shift are fitted in turn.
+/// Rounds of alternating fits of stand and shift.
 const ROUNDS: usize = 4;
-/// Correlation with the plain stand's answer below which a part does not show its shift.
+/// Correlation with the plain stand's response below which the lag of a part is unreliable.
 const SEEN: f64 = 0.5;
-/// Shift in samples, and drift over a record in samples, below which the channels count as aligned.
+/// Shift, and drift over a record, in samples, below which the channels count as aligned.
 const LEAST_SHIFT: f64 = 0.05;
 const LEAST_DRIFT: f64 = 0.3;
-/// Error with a shift, over that without, from which on the channels count as aligned.
+/// Ratio of the error with a shift to that without, above which the channels count as aligned.
 const NO_BETTER: f64 = 0.9;
-/// Error with two clocks, over that with a shift alone, above which they count as one.
+/// Ratio of the error with two clocks to that with a shift alone, above which they count as one.
 const ONE_CLOCK: f64 = 0.7;
-/// Points on each side from which a value between samples is interpolated.
+/// Interpolation points on each side of a value between samples.
 const POINTS: i64 = 24;
 
-/// Steps, in samples, by which the shift is tried on both sides in the end.
+/// Final step sizes, in samples, for trial shifts in both directions.
 const FINER: [f64; 4] = [0.2, 0.1, 0.05, 0.02];
 
 const FIT: FitEffort = FitEffort::full(15);
 const FINE_FIT: FitEffort = FitEffort::full(5);
 
-/// How late the measured channel is against the applied one.
+/// Delay of the measured channel relative to the applied one.
 #[derive(Clone, Copy, Default)]
 pub struct Shift {
     /// At the first sample, in s; negative if it is early.
     pub late_s: f64,
-    /// Growth of that, in s per s: the clocks differ.
+    /// Its growth, in s per s, due to different clocks.
     pub per_s: f64,
 }
 
-/// A shift of the channels, and the plain stand that it leaves.
+/// A shift of the channels, and the plain stand fitted with it.
 pub struct Alignment {
     pub shift: Shift,
     /// The plain stand of the aligned records.
     pub context: FitContext,
-    /// Rms error of the plain stand on the training records over their rms, without the shift and with it.
+    /// Relative RMS error of the plain stand on the training records, without and with the shift.
     pub errors: [f64; 2],
 }
 
 impl Alignment {
-    /// The shift that lowers the error of the plain stand on the training records, if one does.
+    /// The shift that reduces the error of the plain stand on the training records, if any.
     pub fn find(case: &Case, context: &FitContext, as_given: f64) -> Option<Self> {
         if context.held.is_some() {
             return None;
@@ -96,8 +96,8 @@ impl Alignment {
         })
     }
 
-    /// The best model of aligned training records with less in it than a model of them as they are: the plain stand, or that
-    /// model without one of its effects.
+    /// The best model of aligned training records that is simpler than a model of the records as given: the plain
+    /// stand, or that model without one of its effects.
     pub fn instead_of(
         &self,
         after: &ScoredModel,
@@ -119,7 +119,7 @@ impl Alignment {
     }
 }
 
-/// The plain stand whose answer correlates best with a record at any lag.
+/// The plain stand whose response correlates best with a record at any lag.
 fn best_start(case: &Case, context: &FitContext, record: &StandRecord) -> Option<PlainStand> {
     let y = without_mean(record.measured_in_range());
     let left = |start: &PlainStand| {
@@ -143,10 +143,10 @@ fn best_start(case: &Case, context: &FitContext, record: &StandRecord) -> Option
     Some(all.min_by(|a, b| a.0.total_cmp(&b.0))?.1)
 }
 
-/// A shift, the plain stand fitted with it, and the error that both leave.
+/// A shift, the plain stand fitted with it, and the resulting error.
 type Found = (Shift, FitContext, f64);
 
-/// Fits stand and shift in turn: the shift as it is on average over each of some parts of the longest record.
+/// Fits stand and shift alternately, with the mean shift of each part of the longest record.
 fn follow(
     context: &FitContext,
     start: PlainStand,
@@ -175,13 +175,13 @@ fn follow(
         }
     }
     let mut best = best?;
-    // What rings long correlates nearly as well at a wrong lag.
+    // A lightly damped response correlates nearly as well at a wrong lag.
     for step in FINER {
         let late_s = step / rate_hz;
         let per_s = step / longest.measured.len() as f64;
         let mut steps = vec![(late_s, 0.0), (-late_s, 0.0)];
         if parts > 1 {
-            // About the middle of the record.
+            // Rotates about the middle of the record.
             steps.extend([(late_s, -2.0 * per_s), (-late_s, 2.0 * per_s)]);
         }
         for (late_s, per_s) in steps {
@@ -196,7 +196,7 @@ fn follow(
     Some(best)
 }
 
-/// The plain stand of training records that are aligned by a shift, fitted from a start.
+/// The plain stand fitted from a start to training records aligned by a shift.
 fn with_shift(
     context: &FitContext,
     start: PlainStand,
@@ -214,7 +214,7 @@ fn with_shift(
     Some((shift, here, error))
 }
 
-/// What a plain stand makes of the applied quantity over a record's range.
+/// Response of a plain stand to the applied quantity over a record's range.
 fn answer(context: &FitContext, stand: &PlainStand, record: &StandRecord) -> Vec<f64> {
     let modelled = context
         .chain(stand)
@@ -222,7 +222,7 @@ fn answer(context: &FitContext, stand: &PlainStand, record: &StandRecord) -> Vec
     modelled[record.range.clone()].to_vec()
 }
 
-/// Middle and lag, in samples, of each part of a record that shows its lag behind what is modelled.
+/// Middle and lag, in samples, of each part of a record with a reliable lag behind the model.
 fn lags(modelled: &[f64], measured: &[f64], parts: usize, any_sign: bool) -> Vec<[f64; 2]> {
     let length = measured.len() / parts;
     let of_part = |part: usize| {
@@ -235,7 +235,7 @@ fn lags(modelled: &[f64], measured: &[f64], parts: usize, any_sign: bool) -> Vec
     (0..parts).filter_map(of_part).collect()
 }
 
-/// The straight line through lags over time: its value at the first sample and its slope; a constant for a single one.
+/// The straight line through lags over time: its value at the first sample and its slope; a constant for a single lag.
 fn line(lags: &[[f64; 2]]) -> Option<[f64; 2]> {
     let count = lags.len() as f64;
     let mean = |k: usize| lags.iter().map(|lag| lag[k]).sum::<f64>() / count;
@@ -249,7 +249,7 @@ fn line(lags: &[[f64; 2]]) -> Option<[f64; 2]> {
     }
 }
 
-/// Lag of `y` behind `x` at which their correlation is largest (in size, with any sign), and the sum of products there.
+/// Lag of `y` behind `x` with the largest correlation (in magnitude, with any sign), and the sum of products there.
 fn peak(x: &[f64], y: &[f64], any_sign: bool) -> Option<(f64, f64)> {
     let products = correlation(x, y);
     let size = |k: usize| {
@@ -277,7 +277,7 @@ fn peak(x: &[f64], y: &[f64], any_sign: bool) -> Option<(f64, f64)> {
     Some((whole + part, sign * (at - 0.25 * (before - after) * part)))
 }
 
-/// Sums of products `x(i) y(i + k)` for lags `k`, negative ones from the end on.
+/// Sums of products `x(i) y(i + k)` for lags `k`, with negative lags at the end.
 fn correlation(x: &[f64], y: &[f64]) -> Vec<f64> {
     let length = (2 * x.len()).next_power_of_two();
     let (forward, inverse) = (
@@ -288,7 +288,7 @@ fn correlation(x: &[f64], y: &[f64]) -> Vec<f64> {
         let mut padded = samples.to_vec();
         padded.resize(length, 0.0);
         let mut spectrum = forward.make_output_vec();
-        // The lengths are those that the plan was made for.
+        // Cannot fail: the lengths match the plan.
         let _ = forward.process(&mut padded, &mut spectrum);
         spectrum
     });
@@ -300,8 +300,8 @@ fn correlation(x: &[f64], y: &[f64]) -> Vec<f64> {
 }
 
 impl StandRecord {
-    /// The record with its measured channel brought onto the instants of the applied one; samples that lie beyond the record
-    /// then do not count.
+    /// The record with its measured channel resampled at the instants of the applied one; samples from beyond the
+    /// record are excluded.
     fn aligned(&self, shift: Shift) -> Self {
         let rate_hz = self.rate_hz();
         let count = self.measured.len();
@@ -328,7 +328,7 @@ impl StandRecord {
     }
 }
 
-/// A record between its samples: the sum of sines over their arguments, under a Hann window.
+/// Value of a record between its samples: sinc interpolation with a Hann window.
 fn between(samples: &[f64], place: f64) -> f64 {
     let nearest = place.round();
     let last = samples.len() as i64 - 1;

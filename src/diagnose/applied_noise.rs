@@ -1,9 +1,9 @@
-//! Effects that only take out of a model what noise on the applied quantity does in it.
+//! Detection of effects that only remove the response of a model to noise on the applied quantity.
 //!
-//! The record has the motion under what acted, the model that under what was recorded of it, noise included. A gap, or friction
-//! that holds still what is smaller than it, lets less of this noise through: the error falls although the stand has nothing of
-//! the kind. With twice the noise it falls by as much again, which an effect of the stand does not cause: as in simulation
-//! extrapolation (J. R. Cook, L. A. Stefanski, J. Am. Stat. Assoc. 89 (1994), 1314).
+//! The stand responds to the true applied quantity, the model to its recorded value including noise. A gap, or friction
+//! that blocks small motions, passes less of this noise, so the error falls although the stand has no such effect. With
+//! twice the noise it falls by as much again, unlike for a real effect: as in simulation extrapolation (J. R. Cook, L.
+//! A. Stefanski, J. Am. Stat. Assoc. 89 (1994), 1314).
 
 use std::sync::Arc;
 
@@ -16,20 +16,20 @@ use super::records::Records;
 use super::score::ScoredModel;
 use torqcomp_dsp::dot;
 
-/// Part of a gain from which on it is that of the noise.
+/// Fraction of a gain above which it is attributed to noise.
 const MOSTLY: f64 = 0.5;
 
-/// The records on which models are compared with the noise on their applied quantity doubled: once with further noise added, once
-/// with it taken off, so that its products with the noise that is there cancel.
+/// Records for comparing models with the noise on their applied quantity doubled: once with further noise added, once
+/// with it subtracted, so that its products with the existing noise cancel.
 pub struct NoisierRecords {
     added: Vec<StandRecord>,
     taken_off: Vec<StandRecord>,
-    /// Whether they are the training records, of which each model has the initial states.
+    /// Whether they are the training records, for which each model has initial states.
     are_fitted: bool,
 }
 
 impl NoisierRecords {
-    /// `None` if the applied quantity has no noise, as far as that is seen.
+    /// `None` if the applied quantity has no detectable noise.
     pub fn of(records: &Records) -> Option<Self> {
         let are_fitted = records.holdout.is_empty();
         let compared = match are_fitted {
@@ -54,7 +54,7 @@ impl NoisierRecords {
         has_noise.then_some(found)
     }
 
-    /// Whether a model explains more than another one does beyond what it takes out of the noise on the applied quantity.
+    /// Whether a model explains more than another beyond removing the response to noise on the applied quantity.
     pub fn bear_out(&self, before: &ScoredModel, after: &ScoredModel) -> bool {
         let [Some(noisy_before), Some(noisy_after)] = [before, after].map(|m| self.left_by(m))
         else {
@@ -65,7 +65,7 @@ impl NoisierRecords {
         of_noise <= MOSTLY * gain
     }
 
-    /// Mean sum of squares that a model leaves of both; `None` if the motion diverges.
+    /// Mean residual sum of squares of a model on both; `None` if the motion diverges.
     fn left_by(&self, model: &ScoredModel) -> Option<f64> {
         let sum = |records: &[StandRecord]| -> Option<f64> {
             let records = match self.are_fitted {

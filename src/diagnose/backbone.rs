@@ -1,12 +1,13 @@
-//! The backbone of free ringing: frequency and decay over amplitude, and the stiffness or the friction that follows from it.
+//! Backbone of a free decay: frequency and decay rate over amplitude, and the stiffness or friction that follows from
+//! it.
 //!
-//! Beside `ω₀² (x + c x³)` a swing of amplitude A turns with `ω₀ + s A²`, `s = 3 c ω₀/8` (A. H. Nayfeh, D. T. Mook, Nonlinear
-//! Oscillations, 1979, 2.3). With the amplitude `A₀ exp(−δ t)` its phase is `a + ω₀ t + s A₀² (1 − exp(−2 δ t))/(2 δ)`, and a
-//! multiple of π where the record crosses its mean. From a plain stand's frequency, a fit does not find the way over a phase
-//! that is off by a turn.
+//! With `ω₀² (x + c x³)` an oscillation of amplitude A has the frequency `ω₀ + s A²`, `s = 3 c ω₀/8` (A. H. Nayfeh, D.
+//! T. Mook, Nonlinear Oscillations, 1979, 2.3). With the amplitude `A₀ exp(−δ t)` its phase is
+//! `a + ω₀ t + s A₀² (1 − exp(−2 δ t))/(2 δ)`, a multiple of π where the record crosses its mean. A fit from a plain
+//! stand's frequency does not converge once the phase is off by a turn.
 //!
-//! Dry friction F takes `2 ω₀ F/π` off the amplitude each second, drag `d x' |x'|` takes `4 d ω₀³ A²/(3 π)` (the same, chapter 3),
-//! beside `δ A`.
+//! Dry friction F reduces the amplitude by `2 ω₀ F/π` per second, drag `d x' |x'|` by `4 d ω₀³ A²/(3 π)` (same source,
+//! chapter 3), in addition to `δ A`.
 
 use std::f64::consts::PI;
 
@@ -16,38 +17,40 @@ use torqcomp_model::simulate::MotionState;
 
 use super::record::{InitialState, StandRecord};
 
-/// Swing, over the largest, that a half-wave must reach to be one, and amplitude up to which half-waves count.
+/// Minimum excursion of a half-wave, and minimum amplitude of those used, relative to the largest.
 const REACHES: f64 = 0.05;
 const COUNTS: f64 = 0.1;
-/// Damping ratio below which a few half-waves do not show it beside what bends the decay.
+/// Minimum damping ratio that a few half-waves can separate from the nonlinearity of the decay.
 const LEAST_RATIO: f64 = 1e-3;
-/// Fewest half-waves.
+/// Minimum number of half-waves.
 const FEWEST: usize = 5;
 
-/// What a record of free ringing shows of an effect that bends its frequency or its decay.
+/// Estimate, from a free decay, of an effect that makes its frequency or decay rate depend on
+/// amplitude.
 #[derive(Debug, Clone, Copy)]
 pub struct Backbone {
     /// `ω₀` in rad/s.
     pub omega_rad_s: f64,
     /// `δ/ω₀`.
     pub damping_ratio: f64,
-    /// Size of the effect, in the record's unit and s.
+    /// Magnitude of the effect, in the record's unit and s.
     pub size: f64,
     /// State at the first sample.
     pub motion: MotionState,
 }
 
-/// A half-wave: when it begins, and its amplitude.
+/// A half-wave: its start and amplitude.
 struct HalfWave {
     start_s: f64,
     amplitude: f64,
 }
 
 impl Backbone {
-    /// That of a record; `None` if it has too few half-waves or does not decay, or the effect, by its name, bends neither.
+    /// Backbone of a record; `None` if it has too few half-waves or does not decay, or the named effect affects neither
+    /// frequency nor decay rate.
     pub fn of(record: &StandRecord, effect: &str) -> Option<Self> {
         let (waves, sign) = half_waves(record)?;
-        // The swing, and the size of the effect over what bends it.
+        // The oscillation, and the effect's magnitude per coefficient of the nonlinearity.
         let (found, over_bend): (_, fn(f64) -> f64) = match effect {
             "cubic-stiffness" => (Swing::that_turns_faster(&waves)?, |omega| {
                 8.0 / (3.0 * omega)
@@ -76,7 +79,7 @@ impl Backbone {
         })
     }
 
-    /// The state that a fit starts from.
+    /// Initial state for a fit.
     pub fn initial(&self) -> InitialState {
         InitialState {
             motion: self.motion,
@@ -85,12 +88,12 @@ impl Backbone {
     }
 }
 
-/// A swing of which one law bends the frequency or the decay.
+/// An oscillation whose frequency or decay rate follows one law of amplitude.
 struct Swing {
     omega_rad_s: f64,
     rate_per_s: f64,
     bend: f64,
-    /// Amplitude, phase, their change at the first sample.
+    /// Amplitude, phase, and their rates of change at the first sample.
     amplitude: f64,
     phase: f64,
     turns_rad_s: f64,
@@ -116,7 +119,7 @@ impl Swing {
         })
     }
 
-    /// Amplitude that falls by `δ A + b g(A)`: with the sums of both up to each half-wave, a line in these.
+    /// Amplitude that falls by `δ A + b g(A)`: linear in the cumulative sums of both up to each half-wave.
     fn that_loses(waves: &[HalfWave], law: impl Fn(f64) -> f64) -> Option<Self> {
         let [phase, omega] = least_squares(phases(waves), |t| [1.0, t])?;
         let first = waves.first()?;
@@ -141,7 +144,7 @@ impl Swing {
         }
         let [start, rate, bend] = all;
         let falls_per_s = rate * start + bend * law(start);
-        // The amplitude is that of the middle of a half-wave.
+        // The amplitude is that at the middle of a half-wave.
         let before_s = first.start_s + 0.5 * PI / omega;
         Some(Self {
             omega_rad_s: omega,
@@ -155,13 +158,13 @@ impl Swing {
     }
 }
 
-/// The phase at the beginning of each half-wave.
+/// Phase at the start of each half-wave.
 fn phases(waves: &[HalfWave]) -> impl Iterator<Item = (f64, f64)> {
     let phases = (0..).map(|k| f64::from(k) * PI);
     phases.zip(waves).map(|(phase, w)| (phase, w.start_s))
 }
 
-/// The half-waves of a record about its mean, and the sign of the first.
+/// Half-waves of a record about its mean, and the sign of the first.
 fn half_waves(record: &StandRecord) -> Option<(Vec<HalfWave>, f64)> {
     let measured = record.measured_in_range();
     let mean = measured.iter().sum::<f64>() / measured.len() as f64;
@@ -181,7 +184,7 @@ fn half_waves(record: &StandRecord) -> Option<(Vec<HalfWave>, f64)> {
                 break;
             }
             sign = now.signum();
-            // What precedes the first crossing is part of a half-wave.
+            // The part before the first crossing is an incomplete half-wave.
             if let Some(at) = crossing {
                 first_sign = if waves.is_empty() { sign } else { first_sign };
                 let start_s = time_s(at);
@@ -195,12 +198,12 @@ fn half_waves(record: &StandRecord) -> Option<(Vec<HalfWave>, f64)> {
             wave.amplitude = wave.amplitude.max(now.abs());
         }
     }
-    // The last one may be cut off.
+    // The last one may be incomplete.
     waves.pop();
     (waves.len() >= FEWEST).then_some((waves, first_sign))
 }
 
-/// Coefficients of functions of what comes second that give the first.
+/// Least-squares coefficients of functions of the second value of each pair that give the first.
 fn least_squares<T, const N: usize>(
     rows: impl Iterator<Item = (f64, T)>,
     columns: impl Fn(T) -> [f64; N],

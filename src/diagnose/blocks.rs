@@ -1,15 +1,15 @@
-//! Whether one model is significantly better than another where neighbouring samples are correlated.
+//! Significance of the difference between two models with autocorrelated residuals.
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::spectra::energy_spectrum;
 
-/// Blocks that the residuals are cut into.
+/// Number of blocks of the residuals.
 const BLOCKS: usize = 64;
-/// Draws of the bootstrap.
+/// Number of bootstrap draws.
 const DRAWS: usize = 2000;
 
-/// Sums over blocks of two models' residuals on the same samples.
+/// Block sums of two models' residuals on the same samples.
 pub struct Comparison {
     /// Squares of the first model's residual.
     before: Vec<f64>,
@@ -17,7 +17,7 @@ pub struct Comparison {
     after: Vec<f64>,
     /// Products of the second residual with the difference of the two.
     product: Vec<f64>,
-    /// Variance of the sum of these products in noise that has the spectrum of the second residual.
+    /// Variance of the sum of these products in noise with the spectrum of the second residual.
     coloured: f64,
 }
 
@@ -37,17 +37,18 @@ pub fn compare(before: &[f64], after: &[f64]) -> Comparison {
     }
 }
 
-/// Resolved frequencies to each side over which the spectrum of a residual is averaged: a fit takes what it fits out of a few
-/// of them.
+/// Number of frequencies on each side over which the spectrum of a residual is averaged, as a fit removes its own part
+/// from a few of them.
 const AROUND: usize = 3;
 
-/// The variance of `Σ d r` for the change `d` of a residual, in stationary noise `r` with the spectrum of the second residual:
-/// `Σ_f |D(f)|² S(f)`.
+/// Variance of `Σ d r` for the change `d` of a residual, in stationary noise `r` with the spectrum of the second
+/// residual: `Σ_f |D(f)|² S(f)`.
 fn coloured(before: &[f64], after: &[f64]) -> f64 {
     let change: Vec<f64> = before.iter().zip(after).map(|(b, a)| b - a).collect();
     let change = energy_spectrum(&change, 0);
     let noise = energy_spectrum(after, AROUND);
-    // White noise of the variance σ² has n σ² in all frequencies together, and the result is σ² Σ d².
+    // For white noise of variance σ², the energies of all frequencies sum to n σ², and the result is
+    // σ² Σ d².
     let sum: f64 = change.iter().zip(&noise).map(|(d, s)| d * s).sum();
     sum * (change.len() as f64) / after.len().max(1) as f64
 }
@@ -58,7 +59,7 @@ impl Comparison {
         self.before.iter().sum::<f64>() - self.after.iter().sum::<f64>()
     }
 
-    /// Reduction of the sum of squares without what noise adds to it or takes from it, and its standard deviation due to
+    /// Expected reduction of the sum of squares, without the contribution of noise, and its standard deviation due to
     /// noise.
     pub fn expected_gain(&self) -> [f64; 2] {
         let noise = 2.0 * self.product.iter().sum::<f64>();
@@ -75,31 +76,31 @@ impl Comparison {
         2.0 * scatter.max(self.coloured).sqrt()
     }
 
-    /// The gain over its standard deviation due to noise.
+    /// The gain in standard deviations due to noise.
     ///
     /// With `d` the difference of the residuals and `r` the second one, the gain is `Σ d² + 2 Σ d r`. If `r` is noise,
-    /// only the second sum varies. Its variance is the larger of two: that from the scatter of blocks, which holds where the
-    /// residual has most of its power in a few places, as in a sweep, and that from the spectra of both, which holds where
-    /// the noise rings for longer than a block.
+    /// only the second sum varies. Its variance is the larger of two estimates: from the scatter of blocks, valid if
+    /// the residual has most of its power in a few places, as in a sweep, and from the spectra of both, valid if the
+    /// noise is correlated over more than a block.
     pub fn significance(&self) -> f64 {
         let std = self.std();
         if std > 0.0 { self.gain() / std } else { 0.0 }
     }
 
-    /// Products of the blocks, over the root of the sum of their squares.
+    /// Products of the blocks, normalised by the root of the sum of their squares.
     fn scaled_products(&self) -> Vec<f64> {
         let size = self.product.iter().map(|p| p * p).sum::<f64>().sqrt();
         let over = |product: &f64| if size > 0.0 { product / size } else { 0.0 };
         self.product.iter().map(over).collect()
     }
 
-    /// Probability of a gain as large by chance, if the second model were no better.
+    /// Probability of an equal or larger gain by chance, if the second model were no better.
     pub fn p_value(&self) -> Option<f64> {
         let law = StudentsT::new(0.0, 1.0, self.before.len() as f64 - 1.0).ok()?;
         Some(law.sf(self.significance()))
     }
 
-    /// 95 % confidence interval of the relative reduction of the rms: bootstrap over the blocks.
+    /// 95 % confidence interval of the relative reduction of the RMS, by bootstrap over the blocks.
     pub fn improvement_ci95(&self) -> [f64; 2] {
         let mut random = SplitMix64(0x9E37_79B9_7F4A_7C15);
         let count = self.before.len();
@@ -121,11 +122,11 @@ impl Comparison {
     }
 }
 
-/// For each of several gains over the same model, the probability that the largest of them all is as large by chance.
+/// For each of several gains over the same model, the probability that the largest of all is as large by chance.
 ///
-/// If no model is better, the product of each block has either sign; the same signs are drawn for all models, so that those
-/// that resemble each other count as one (P. H. Westfall, S. S. Young, Resampling-based multiple testing, Wiley (1993)).
-/// Where no draw reaches a gain, its own probability times the number of models bounds it (Bonferroni).
+/// If no model is better, the product of each block has a random sign; the same signs are drawn for all models, so that
+/// similar models count as one (P. H. Westfall, S. S. Young, Resampling-based multiple testing, Wiley (1993)). If no
+/// draw reaches a gain, its own probability times the number of models is the bound (Bonferroni).
 pub fn family_p_values(comparisons: &[Comparison]) -> Vec<Option<f64>> {
     let scaled: Vec<Vec<f64>> = comparisons
         .iter()
@@ -156,7 +157,7 @@ pub fn family_p_values(comparisons: &[Comparison]) -> Vec<Option<f64>> {
 pub struct SplitMix64(pub u64);
 
 impl SplitMix64 {
-    /// A number of unit variance, roughly normal: the sum of twelve in [0, 1), less 6.
+    /// A number of unit variance, approximately normal: the sum of twelve in [0, 1), minus 6.
     pub fn normal(&mut self) -> f64 {
         let uniform = |r: &mut Self| r.below(1 << 20) as f64 / f64::from(1 << 20);
         (0..12).map(|_| uniform(self)).sum::<f64>() - 6.0
@@ -179,8 +180,8 @@ mod tests {
         (0..count).map(|_| random.normal()).collect()
     }
 
-    /// Of twenty models none of which is better than the first, the best has p < 5 % in 5 % of 200 cases: 10, and hardly ever
-    /// more than 20. With p-values for one model alone, that were 1 − 0.95²⁰ = 64 %.
+    /// If none of twenty models is better than the first, the best has p < 5 % in 5 % of 200 cases: 10, and hardly ever
+    /// more than 20. With p-values for a single model, it would be 1 − 0.95²⁰ = 64 %.
     #[test]
     fn the_best_of_many_is_no_better_by_chance() {
         let mut random = SplitMix64(3);
@@ -188,7 +189,7 @@ mod tests {
         let mut found = 0;
         for _ in 0..200 {
             let before = noise(&mut random, 640);
-            // A small change that has nothing to do with the residual; at its best size it only fits noise.
+            // A small change unrelated to the residual; at its optimum size it only fits noise.
             let comparisons: Vec<Comparison> = (0..20)
                 .map(|_| {
                     let change = noise(&mut random, 640);
@@ -208,8 +209,8 @@ mod tests {
         assert!(alone > 80, "{alone} of 200");
     }
 
-    /// Noise that rings for longer than a block, and the best of 200 lines: by the scatter of the blocks alone, 36 of 40 would
-    /// be significant.
+    /// Noise correlated over more than a block, and the best of 200 lines: judged by the scatter of the blocks alone,
+    /// 36 of 40 would be significant.
     #[test]
     fn a_line_fitted_to_ringing_noise_is_not_significant() {
         let mut random = SplitMix64(11);
@@ -230,7 +231,7 @@ mod tests {
         assert!(seen <= 4, "{seen} of 40");
     }
 
-    /// A residual compared with itself less the line of a frequency.
+    /// A residual compared with itself minus its line at a frequency.
     fn line(before: &[f64], rad_per_sample: f64) -> Comparison {
         let phases = (0..before.len()).map(|i| rad_per_sample * i as f64);
         let (cosine, sine): (Vec<f64>, Vec<f64>) = phases.map(|p| (p.cos(), p.sin())).unzip();

@@ -1,4 +1,4 @@
-//! Standard uncertainties of what was fitted, in noise of the colour that the training residuals have.
+//! Standard uncertainties of fitted parameters for noise with the spectrum of the training residuals.
 
 use nalgebra::DMatrix;
 
@@ -8,13 +8,14 @@ use super::score::{ScoredModel, derivatives};
 use crate::noise_colour;
 use torqcomp_dsp::dot;
 
-/// Half-width over which the spectrum of the residual is averaged, in the damping `ζω₀` of the stand: noise on the applied
-/// quantity peaks at its resonance.
+/// Half-width over which the spectrum of the residual is averaged, in units of the stand's decay rate `ζω₀`: noise on
+/// the applied quantity peaks at its resonance.
 const WIDTH: f64 = 0.5;
 
 impl ScoredModel {
-    /// The same with standard uncertainties that allow for the colour of the training residuals; noise on the applied
-    /// quantity, filtered by the stand, gives them one. Where the derivatives cannot tell, those for white noise stay.
+    /// Replaces the standard uncertainties by ones that allow for the colour of the training residuals, which noise on
+    /// the applied quantity acquires from the stand. Those for white noise remain where the derivatives are
+    /// unavailable.
     pub fn with_coloured_std(mut self, records: &Records) -> Self {
         if let Some((free, covariance)) = coloured_covariance(&self, records) {
             for (i, k) in free.iter().enumerate() {
@@ -26,7 +27,7 @@ impl ScoredModel {
     }
 }
 
-/// Rms of what parameters of that covariance leave uncertain of the compared records: with `J` their derivatives,
+/// RMS uncertainty of the compared records due to parameters with this covariance: with `J` their derivatives,
 /// `√(tr(C JᵀJ)/n)`.
 fn uncertain_rms(model: &ScoredModel, free: &[usize], covariance: &DMatrix<f64>) -> Option<f64> {
     let fitted = &model.fitted;
@@ -44,7 +45,7 @@ fn uncertain_rms(model: &ScoredModel, free: &[usize], covariance: &DMatrix<f64>)
     Some((sum.max(0.0) / count.max(1) as f64).sqrt())
 }
 
-/// The parameters that the training records determine, by their places, and their covariance.
+/// Indices and covariance of the parameters determined by the training records.
 fn coloured_covariance(
     model: &ScoredModel,
     records: &Records,
@@ -56,7 +57,8 @@ fn coloured_covariance(
         .iter()
         .map(|record| derivatives(fitted, record, &terms).0);
     let each: Vec<Vec<Vec<f64>>> = each.collect::<Option<_>>()?;
-    // The frequency of a line is fitted with its phases, record by record: it has no column here.
+    // The frequency of a line is fitted together with its phases in each record, so it has no
+    // column here.
     let moves = |k: usize| {
         each.iter()
             .any(|columns| columns[k].iter().any(|d| *d != 0.0))

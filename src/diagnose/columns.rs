@@ -1,31 +1,34 @@
-//! Columns that a residual is cleared of.
+//! Projection of a residual off a set of columns.
 
 use std::sync::Arc;
 
 use torqcomp_dsp::dot;
 
-/// Part of a column that must be left after the others are taken out of it.
+/// Minimum fraction of a column that must remain after orthogonalisation.
 const LEFT: f64 = 1e-6;
-/// Part above which what is left is orthogonal to within rounding (B. N. Parlett, *The Symmetric Eigenvalue Problem* (1980), 107).
+/// Fraction above which the remainder is orthogonal to within rounding (B. N. Parlett, *The Symmetric Eigenvalue
+/// Problem* (1980), 107).
 const MUCH: f64 = 0.5;
 
-/// Columns, made orthonormal one after the other.
+/// Columns, orthonormalised one after the other.
 #[derive(Debug, Clone, Default)]
 pub struct Columns {
     orthonormal: Vec<Arc<Vec<f64>>>,
-    /// The columns as they came, each a combination of the orthonormal ones up to its own:
-    /// `raw_k = Σ_j mix[k][j] orthonormal_j`; none for a column that depends on those before.
+    /// The original columns as combinations of the orthonormal ones:
+    /// `raw_k = Σ_j mix[k][j] orthonormal_j`; `None` for a column that depends on the preceding
+    /// ones.
     mix: Vec<Option<Vec<f64>>>,
 }
 
 impl Columns {
-    /// Columns that came, those that depend on others among them.
+    /// Number of columns added, including dependent ones.
     #[must_use]
     pub fn count(&self) -> usize {
         self.mix.len()
     }
 
-    /// Adds a column. Where most of it is taken out it is orthogonalised twice, as once is not enough for nearly dependent ones.
+    /// Adds a column. If most of it is removed, it is orthogonalised twice, as once is not enough for nearly dependent
+    /// columns.
     pub fn push(&mut self, mut column: Vec<f64>) {
         let size = dot(&column, &column).sqrt();
         let mut mix = vec![0.0; self.orthonormal.len()];
@@ -51,14 +54,15 @@ impl Columns {
         self.mix.push(is_new.then_some(mix));
     }
 
-    /// Clears a residual of all columns.
+    /// Projects a residual off all columns.
     pub fn clear(&self, residual: &mut [f64]) {
         let _ = self.take(residual);
     }
 
-    /// Clears a residual; the coefficients of the columns as they came, dependent ones having none.
+    /// Projects a residual off all columns and returns the coefficients of the original columns,
+    /// zero for dependent ones.
     pub fn fit(&self, residual: &mut [f64]) -> Vec<f64> {
-        // mix is triangular: solved from the last column on.
+        // mix is triangular: back substitution.
         let mut rest = self.take(residual);
         let mut raw = vec![0.0; self.mix.len()];
         for (raw, row) in raw.iter_mut().zip(&self.mix).rev() {
@@ -72,7 +76,7 @@ impl Columns {
         raw
     }
 
-    /// Sum of the squares that clearing takes out of a residual.
+    /// Sum of squares of a residual explained by the columns.
     #[must_use]
     pub fn explained(&self, residual: &[f64]) -> f64 {
         let part = |column: &Arc<Vec<f64>>| dot(column, residual).powi(2);
@@ -107,7 +111,7 @@ mod tests {
 
     #[test]
     fn coefficients_and_what_is_left() {
-        // 2·a − 3·b + (0, 0, 0, 5), the other columns depending on these.
+        // 2·a − 3·b + (0, 0, 0, 5); the other columns depend on these.
         let (a, b) = (vec![1.0, 1.0, 1.0, 0.0], vec![1.0, 2.0, 3.0, 0.0]);
         let (twice, sum) = (vec![2.0, 2.0, 2.0, 0.0], vec![2.0, 3.0, 4.0, 0.0]);
         let columns: Columns = [a, twice, b, sum].into_iter().collect();

@@ -1,4 +1,4 @@
-//! The constants of the stand that a diagnosis reports.
+//! Constants of the stand reported by a diagnosis.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -80,7 +80,7 @@ pub fn constants(case: &Case, found: &SearchState) -> Vec<StandConstant> {
     all
 }
 
-/// The numbers of each mode of a stand with several.
+/// Constants of each mode of a stand with several.
 fn of_modes(declared: &SeveralModes, found: &SearchState) -> Vec<StandConstant> {
     let (before, after) = (found.before.modes(), found.after.modes());
     let both = before.iter().zip(&after).zip(declared.numbers());
@@ -109,7 +109,7 @@ fn of_held(held: &HeldBody, found: &SearchState) -> Vec<StandConstant> {
 }
 
 impl ScoredModel {
-    /// Frequency in Hz, damping ratio, residue and quadrature of each mode of a stand with several; none of another.
+    /// Frequency in Hz, damping ratio, residue and quadrature of each mode of a stand with several; empty otherwise.
     pub fn modes(&self) -> Vec<[Estimate; 4]> {
         let several = &self.fitted.structure.context.several;
         let Some(several) = several else {

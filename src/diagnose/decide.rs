@@ -1,4 +1,4 @@
-//! Which of several candidates is accepted, and how the others compare with it.
+//! Choice of the accepted candidate, and comparison of the others with it.
 
 use std::cell::LazyCell;
 
@@ -14,7 +14,7 @@ const TIED_SIGNIFICANCE: f64 = 2.33;
 /// another.
 const TIED_GAIN: f64 = 9.0;
 
-/// Accepts the best of the candidates that nothing speaks against, and compares the others with it.
+/// Accepts the best of the candidates that are not rejected, and compares the others with it.
 pub fn decide(tried: &mut [CandidateFit], base: &BaseModel, records: &Records) {
     let noisier = LazyCell::new(|| NoisierRecords::of(records));
     let (chosen, tied) = loop {
@@ -38,12 +38,12 @@ pub fn decide(tried: &mut [CandidateFit], base: &BaseModel, records: &Records) {
     tried.swap(0, chosen);
 }
 
-/// The candidates that nothing speaks against.
+/// Indices of the candidates that are not rejected.
 fn passing(tried: &[CandidateFit]) -> impl Iterator<Item = usize> + '_ {
     (0..tried.len()).filter(|k| tried[*k].reason == Reason::Best)
 }
 
-/// The best of the candidates that nothing speaks against, and those that are no worse.
+/// The best of the candidates that are not rejected, and those tied with it.
 fn choose(tried: &[CandidateFit]) -> Option<(usize, Vec<usize>)> {
     let best =
         passing(tried).min_by(|a, b| criterion(tried, *a).total_cmp(&criterion(tried, *b)))?;
@@ -75,10 +75,10 @@ impl ScoredModel {
     }
 }
 
-/// Of effects that the records cannot distinguish: those with the fewest parameters, in a form that is no worse than their best one,
-/// as the criterion takes noise that rings for more evidence than it is; of these the one with the smallest criterion, or of those
-/// close to it the first in the list. So a line at the mains frequency is mains pickup rather than a shaft that happens to turn so
-/// fast, and a lag without a corner is a delay.
+/// Among effects that the records cannot distinguish: those with the fewest parameters, in a form no worse than their
+/// best one, as the criterion overrates evidence in correlated noise; among these the one with the smallest criterion,
+/// or the first in the list of those close to it. So a line at the mains frequency is mains pickup rather than a shaft
+/// at that speed, and a lag without a corner is a delay.
 fn simplest(tried: &[CandidateFit], tied: &[usize]) -> Option<usize> {
     let count = |k: usize| tried[k].fewest_parameters;
     let fewest = tied.iter().map(|k| count(*k)).min()?;
@@ -99,7 +99,7 @@ fn criterion(tried: &[CandidateFit], k: usize) -> f64 {
     model.map_or(f64::INFINITY, ScoredModel::criterion)
 }
 
-/// Why a candidate that passes is not the accepted one.
+/// Why a candidate that passes is not accepted.
 fn behind(other: &CandidateFit, chosen: &CandidateFit, is_tied: bool) -> Option<Reason> {
     let (model, accepted) = (other.model.as_ref()?, chosen.model.as_ref()?);
     let best = chosen.effect.name;

@@ -1,4 +1,4 @@
-//! The stand as its file declares it, with its effects.
+//! The declared stand with its effects.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use super::fit::FittedModel;
 use super::several_modes::SeveralModes;
 use super::structure::{EffectForm, FitContext, PlainStand, Structure};
 
-/// An effect of the stand file.
+/// An effect declared in the stand file.
 #[derive(Clone)]
 pub struct DeclaredForm {
     pub effect: EffectForm,
@@ -14,7 +14,7 @@ pub struct DeclaredForm {
     pub values: Vec<f64>,
 }
 
-/// A stand file's plain stand and its effects.
+/// The plain stand and effects of a stand file.
 #[derive(Clone, Copy)]
 pub struct DeclaredStand<'a> {
     pub plain: PlainStand,
@@ -34,7 +34,7 @@ impl DeclaredStand<'_> {
         }
     }
 
-    /// Values of all parameters that a fit of that structure moves.
+    /// Values of all fit parameters of that structure.
     pub fn values(&self, context: &FitContext) -> Vec<f64> {
         let mut values = context.plain_values(&self.plain);
         for declared in self.effects {
@@ -46,7 +46,7 @@ impl DeclaredStand<'_> {
         values
     }
 
-    /// The stand as it is declared, in the place of one that was fitted.
+    /// The declared stand as a model, in place of a fitted one.
     pub fn model(&self, fitted: &FittedModel) -> FittedModel {
         let context = FitContext {
             several: self.several.cloned(),

@@ -1,4 +1,4 @@
-//! What is said about a diagnosis in words: the residual, the next experiment, warnings.
+//! Verbal description of a diagnosis: the residual, the next experiment, warnings.
 
 use super::SearchState;
 use super::guard_models::GuardModel;
@@ -16,14 +16,15 @@ use super::verdict::Verdict;
 use crate::print::{self, relative, rounded};
 use crate::warning::Warning;
 
-/// Ratio between levels of excitation from which on errors are compared.
+/// Ratio between levels of excitation above which errors are compared.
 const LEVELS_DIFFER: f64 = 1.2;
-/// Ratio between relative errors at two levels from which on it is reported.
+/// Ratio between relative errors at two levels above which it is reported.
 const ERRORS_DIFFER: f64 = 1.3;
-/// Relative standard uncertainty of natural frequency and damping ratio above which the hold-out error says little.
+/// Relative standard uncertainty of natural frequency and damping ratio above which the hold-out error is
+/// inconclusive.
 const MOST_UNCERTAIN: [f64; 2] = [0.005, 0.1];
 
-/// What remains after the diagnosis.
+/// Description of the residual after the diagnosis.
 pub fn residual(
     found: &SearchState,
     verdict: Verdict,
@@ -78,7 +79,7 @@ pub fn residual(
     parts.join("; ")
 }
 
-/// What the residual follows from.
+/// Dependence of the residual.
 fn dependence(tests: &ResidualTests) -> Option<String> {
     match tests.dependence() {
         Some(share) => Some(format!(
@@ -86,7 +87,7 @@ fn dependence(tests: &ResidualTests) -> Option<String> {
             100.0 * share.share,
             share.of
         )),
-        // Changes over a record also make the residual follow from the motion in each part of it.
+        // Changes over a record also make the residual depend on the motion in each part of it.
         None if tests.nonstationary().is_some() => None,
         None if !tests.independent_of_input => Some(format!(
             "correlated with the input (significant at 99 %), strongest at lag {}",
@@ -96,11 +97,11 @@ fn dependence(tests: &ResidualTests) -> Option<String> {
     }
 }
 
-/// Whether the plain stand does worse on records with another level of excitation.
+/// Whether the plain stand performs worse on records with another level of excitation.
 fn level_dependence(levels: &ExcitationLevels) -> Option<String> {
     let applied = [levels.holdout_applied_rms, levels.train_applied_rms];
     if applied.contains(&0.0) {
-        // Free ringing has no level of excitation.
+        // A free decay has no level of excitation.
         return None;
     }
     let level = applied[0] / applied[1];
@@ -117,7 +118,7 @@ fn level_dependence(levels: &ExcitationLevels) -> Option<String> {
     })
 }
 
-/// What to record next.
+/// The next record to take.
 pub fn next_experiment(
     found: &SearchState,
     suspected: Option<&GuardModel>,
@@ -160,11 +161,11 @@ pub fn next_experiment(
     closest.map(|c| c.effect.experiment.to_owned())
 }
 
-/// What to record where the stand has changed.
+/// The next record after the stand has changed.
 const AFTER_A_CHANGE: &str =
     "look at clamps, bolts and what else may have moved at that moment, then record the same again";
 
-/// The records that show a torque over the displacement, or one over the speed.
+/// Records that show a torque as a function of displacement, or of speed.
 pub fn shows_torque(over_displacement: bool) -> &'static str {
     match over_displacement {
         true => "a slow load and unload over the whole range, and the response at two more levels",
@@ -172,7 +173,7 @@ pub fn shows_torque(over_displacement: bool) -> &'static str {
     }
 }
 
-/// What limits the diagnosis.
+/// Limitations of the diagnosis.
 pub fn warnings(before: &ScoredModel, verdict: Verdict) -> Vec<Warning> {
     let is_open = matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained);
     let apart = is_open.then(|| records_apart(before)).flatten();
@@ -182,7 +183,7 @@ pub fn warnings(before: &ScoredModel, verdict: Verdict) -> Vec<Warning> {
         .collect()
 }
 
-/// Training and held-out records that no one stand fits.
+/// Training and held-out records that no single stand fits.
 fn records_apart(before: &ScoredModel) -> Option<Warning> {
     let [train, holdout] = plain_stands_apart(before)?;
     Some(Warning::new(
@@ -196,7 +197,7 @@ fn records_apart(before: &ScoredModel) -> Option<Warning> {
     ))
 }
 
-/// Constants that the training records do not determine well enough for the hold-out error to show a missing effect.
+/// Constants too uncertain from the training records for the hold-out error to reveal a missing effect.
 fn uncertain_constants(before: &ScoredModel) -> Option<Warning> {
     let constants = ["natural frequency", "damping ratio"];
     let constants = constants.into_iter().zip(MOST_UNCERTAIN).enumerate();

@@ -1,4 +1,4 @@
-//! What the records would have shown: for each effect the smallest amount that the search would have found in them.
+//! Detection limits: for each effect, the smallest amount that the search would have found in the records.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -43,13 +43,13 @@ pub enum ShownSide {
     UpTo,
 }
 
-/// Relative width to which a limit is found.
+/// Relative width of the bracket at which the search for a limit ends.
 const WIDTH: f64 = 0.01;
-/// Evaluations after which the search for a limit ends.
+/// Maximum number of evaluations for a limit.
 const MOST: usize = 25;
-/// Largest change of the amount from one evaluation to the next.
+/// Largest change of the amount between evaluations.
 const LARGEST_STEP: f64 = 30.0;
-/// Frequency of a line for which no other is known, in natural frequencies.
+/// Default frequency of a line, in natural frequencies.
 const LINE: f64 = 0.5;
 
 /// The limits of all effects that are not part of a model.
@@ -69,14 +69,14 @@ pub fn detection_limits(
     limits.into_iter().flatten().collect()
 }
 
-/// An effect of which there may be more or less.
+/// An effect of variable amount.
 struct Amount {
     effect: EffectForm,
-    /// Values of its parameters as a fit moves them.
+    /// Values of its fit parameters.
     values: Vec<f64>,
-    /// The parameter that says how much of it there is.
+    /// Index of the parameter that measures its amount.
     size: usize,
-    /// Whether there is the more of it the smaller that one is.
+    /// Whether the effect grows as that parameter falls.
     falls: bool,
 }
 
@@ -103,7 +103,7 @@ impl Amount {
         })
     }
 
-    /// The values with so much of the effect.
+    /// The parameter values for an amount of the effect.
     fn with(&self, amount: f64) -> Vec<f64> {
         let mut values = self.values.clone();
         values[self.size] = match self.falls {
@@ -113,7 +113,7 @@ impl Amount {
         values
     }
 
-    /// The most of it that is physical.
+    /// The largest physical amount.
     fn most(&self) -> f64 {
         let parameter = &self.effect.form.parameters[self.size];
         match (self.falls, self.values[self.size] < 0.0) {
@@ -155,13 +155,13 @@ impl Amount {
                 true => ShownSide::UpTo,
                 false => ShownSide::From,
             },
-            // Further lines are those of other forms.
+            // Further lines belong to other forms.
             at: all,
         }
     }
 
-    /// What so much of the effect changes in the training records, beyond what the model's own parameters can; one record
-    /// after the other.
+    /// Change of the training records by an amount of the effect that the model's own parameters cannot absorb; one
+    /// record after the other.
     fn change(&self, base: &BaseModel, training: &[StandRecord], amount: f64) -> Option<Vec<f64>> {
         let context = &base.scored.fitted.structure.context;
         if !self.effect.is_line() {
@@ -182,7 +182,7 @@ impl Amount {
         }))
     }
 
-    /// By how many times a change of the records meets what the search asks of an effect.
+    /// Ratio of the change of the records to what the search requires of an effect.
     fn evidence(&self, base: &BaseModel, change: &[f64]) -> f64 {
         let left = base.scored.train.iter().map(|r| r.samples.as_slice());
         let left = left.collect::<Vec<_>>().concat();
@@ -191,14 +191,15 @@ impl Amount {
         evidence(&compare(&with, &left), left.len(), parameters)
     }
 
-    /// The smallest amount with an evidence of 1: it grows about with the square of the amount.
+    /// The smallest amount with an evidence of 1; the evidence grows roughly with the square of the
+    /// amount.
     fn smallest(&self, evidence: impl Fn(f64) -> Option<f64>) -> Option<f64> {
         let most = self.most();
         let start = self.values[self.size].abs();
         let mut amount = if self.falls { 1.0 / start } else { start }.min(most);
         let (mut low, mut high) = (0.0_f64, f64::INFINITY);
         for _ in 0..MOST {
-            // Where the motion diverges, there is too much of it.
+            // If the motion diverges, the amount is too large.
             let found = evidence(amount).unwrap_or(f64::INFINITY);
             match found >= 1.0 {
                 true => high = amount,

@@ -1,4 +1,5 @@
-//! Effects exchanged for others: one that was found first may only resemble another, or two others, beside those found later.
+//! Exchange of effects: one that was found first may only resemble another, or two others, and be recognised once later
+//! effects are present.
 
 use torqcomp_model::effects::{EFFECTS, Effect, Form, Stage};
 
@@ -12,30 +13,30 @@ use super::special_cases::own_in_form;
 use super::structure::{EffectForm, Structure};
 use crate::parallel::parallel;
 
-/// Most exchanges.
+/// Maximum number of exchanges.
 const MOST: usize = 3;
-/// Most effects beside which all others are tried in the place of one, and most steps of integration for that, over those of
-/// the stand without effects: what takes more is not of the list.
+/// Limits for trying all other effects in place of one: maximum number of effects, and of integration steps relative to
+/// the stand without effects; a model that needs more is not of the list.
 const MOST_OPEN: usize = 3;
 const FINEST_OPEN: usize = 2;
-/// Forms that are fitted in the place of an effect.
+/// Forms fitted in place of an effect.
 const FOR_EXCHANGE: SearchEffort = SearchEffort {
     first: 12,
     second: 0.1,
     full: 2,
     promising: 0.5,
 };
-/// The fit of another form, which starts where the present one ended.
+/// Fit of another form, starting where the present one ended.
 const OTHER_FORM: FitEffort = FitEffort::full(15);
-/// The effect that changes what a load that stays is recorded as, and a load that bends nothing, over the rms of the records.
+/// The effect that changes the recorded value of a constant load.
 const GAIN: &str = "gain-error";
 const SMALL: f64 = 1e-3;
-/// Parameters of an effect from which on it may imitate two others.
+/// Minimum number of parameters of an effect that may imitate two others.
 pub const MANY: usize = 3;
 
 impl SearchState {
-    /// Exchanges effects for others as long as that explains the records better, or as well with less; whether any was.
-    /// `coarse` is the number of steps of integration for the stand without effects.
+    /// Exchanges effects while that explains the records better, or equally well with less; returns whether any was
+    /// exchanged. `coarse` is the number of integration steps for the stand without effects.
     pub(super) fn exchange(&mut self, coarse: usize, workers: Workers) -> bool {
         let mut seen = vec![sorted(&self.after)];
         for _ in 0..MOST {
@@ -48,8 +49,8 @@ impl SearchState {
         seen.len() > 1
     }
 
-    /// The best model in which one effect is exchanged or found anew, if it is better than the one found, or as good and first
-    /// in the list. While something is left, any effect may come in; otherwise only one that resembles the other.
+    /// The best model with one effect exchanged or refitted, if it is better than the current one, or as good and first
+    /// in the list. While a residual remains, any effect may replace it; otherwise only one that resembles it.
     fn other_effects(
         &self,
         seen: &[Vec<&'static str>],
@@ -97,7 +98,7 @@ impl SearchState {
         found.min_by(|a, b| a.criterion().total_cmp(&b.criterion()))
     }
 
-    /// Whether a model with one effect in the place of another is better than the one found.
+    /// Whether a model with one effect in place of another is better than the current one.
     fn is_better(&self, model: &ScoredModel, present: &Effect, other: &Effect) -> bool {
         let place = |effect: &Effect| EFFECTS.iter().position(|e| e.name == effect.name);
         let difference = model.criterion() - self.after.criterion();
@@ -106,9 +107,9 @@ impl SearchState {
 }
 
 impl SearchState {
-    /// Gives effects another form beside an error of the gain, where that explains the records better; whether any got one. Whether
-    /// a torque is part of the stand's stiffness, and whether the gage shows it, changes what a load that stays is recorded as:
-    /// beside a gain that is declared wrong, the wrong form may be the best of each alone.
+    /// Changes the form of effects together with a gain error, if that explains the records better; returns whether any
+    /// changed. Whether a torque is part of the stand's stiffness, and whether the gage shows it, changes the recorded
+    /// value of a constant load: with a wrong declared gain, the wrong form may be the best of each alone.
     pub(super) fn exchange_with_gain(&mut self, coarse: usize, workers: Workers) -> bool {
         let gain = listed(&self.after.fitted.structure).find(|effect| effect.name == GAIN);
         let Some(effect) = gain.filter(|_| self.has_room()) else {
@@ -134,8 +135,8 @@ impl SearchState {
 }
 
 impl ScoredModel {
-    /// Structures with an error of the gain in which one of the effects has another form, and values to start with: as stiff as
-    /// before, and with the gain that makes up for what the other form changes at rest.
+    /// Structures with a gain error in which one of the effects has another form, and start values: the same stiffness
+    /// as before, and a gain that compensates the static change of the other form.
     fn with_gain_in_other_forms(&self, gain: EffectForm) -> Vec<(Structure, Vec<f64>)> {
         let fitted = &self.fitted;
         let small = SMALL * fitted.structure.context.scales.rms;
@@ -174,8 +175,8 @@ impl ScoredModel {
         starts
     }
 
-    /// The model with each of its effects that another one resembles in its other forms of the same parameters, fitted: a second
-    /// mode that takes from the first what it adds is one effect, not a second mode and a gain.
+    /// The model refitted with each effect that resembles the other in its other forms with the same parameters: a
+    /// second mode that takes its contribution from the first is one effect, not a second mode and a gain.
     fn in_other_forms(&self, other: &Effect, records: &Records, threads: usize) -> Vec<Self> {
         let fitted = &self.fitted;
         let mut starts = Vec::new();
@@ -193,7 +194,7 @@ impl ScoredModel {
         self.fitted_from(&starts, records, threads)
     }
 
-    /// Fits of other structures that start with given values, and with the motion that this model has at the start of the records.
+    /// Fits of other structures with given start values and this model's initial states of the records.
     fn fitted_from(
         &self,
         starts: &[(Structure, Vec<f64>)],
@@ -210,7 +211,7 @@ impl ScoredModel {
     }
 }
 
-/// The effects of a model in the order of their names.
+/// Effects of a model, sorted by name.
 fn sorted(model: &ScoredModel) -> Vec<&'static str> {
     let mut names = model.effect_names();
     names.sort_unstable();

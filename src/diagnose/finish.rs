@@ -1,5 +1,5 @@
-//! The last fit of what was found: with steps of integration that err by less than the noise leaves uncertain, and in the
-//! plainest form that does as well.
+//! Final fit of the model found: with integration errors below the statistical uncertainty, and in the simplest
+//! equivalent form.
 
 use torqcomp_model::effects::Form;
 
@@ -10,16 +10,17 @@ use super::several_modes::fit_with_modes;
 use super::structure::Structure;
 use crate::parallel::parallel;
 
-/// It starts where another fit ended.
+/// Starts where another fit ended.
 const LAST_FIT: FitEffort = FitEffort::full(8);
-/// Most steps of integration, over those with which the model was chosen: where switching instants keep the integration from
-/// converging faster, still finer steps cost more than they bring.
+/// Largest refinement of the integration step relative to that of the model selection: where switching instants slow
+/// convergence, still finer steps cost more than they gain.
 const FINEST: usize = 8;
 
 impl ScoredModel {
-    /// The model fitted once more to the training records, with all numbers of all modes, and the records with the steps for it;
-    /// `None` if the steps are fine enough already and there is one mode. While effects are compared, the integration may err by a tenth of the residual. That is more
-    /// than long records leave uncertain of a model with few parameters, and it would bias them.
+    /// The model refitted to the training records, with all parameters of all modes, and the records with the required
+    /// steps; `None` if the steps are fine enough already and there is one mode. While effects are compared, the
+    /// integration error may be a tenth of the residual. For long records and few parameters, that exceeds the
+    /// statistical uncertainty and would bias them.
     pub fn finished(&self, records: &Records, threads: usize) -> Option<(Self, Records)> {
         let fine = self.fine_enough(records)?;
         let last = |structure: Structure, values: &[f64]| {
@@ -37,8 +38,8 @@ impl ScoredModel {
         Some((best, fine))
     }
 
-    /// The records with steps so fine that the integration errs by less than the standard uncertainty of the modelled
-    /// record, `σ √(p/n)`; `None` if they are so already, and no further modes are left to be fitted in full.
+    /// The records with steps fine enough that the integration error is below the standard uncertainty of the
+    /// modelled record, `σ √(p/n)`; `None` if they already are, and no further modes are left to be fitted in full.
     fn fine_enough(&self, records: &Records) -> Option<Records> {
         let count: usize = self.train.iter().map(|r| r.samples.len()).sum();
         let uncertain = self.train_rms() * (self.parameter_count() as f64 / count as f64).sqrt();
@@ -56,7 +57,7 @@ impl ScoredModel {
 }
 
 impl FittedModel {
-    /// The same with one of its effects in a form with fewer parameters, all of which the present form has, too.
+    /// The model with one of its effects in a form with a subset of its parameters.
     fn plainer_forms(&self) -> Vec<(Structure, Vec<f64>)> {
         let mut next = self.structure.context.plain_count();
         let mut found = Vec::new();

@@ -1,4 +1,4 @@
-//! Fitting a model to the training records, and its residual on any record.
+//! Fit of a model to the training records, and its residual on any record.
 
 use std::f64::consts::TAU;
 
@@ -18,7 +18,7 @@ pub struct FittedModel {
     pub structure: Structure,
     /// Values of its parameters.
     pub values: Vec<f64>,
-    /// Their standard uncertainties where the data determine them.
+    /// Their standard uncertainties where identifiable.
     pub std: Vec<Option<f64>>,
     pub converged: bool,
     /// Amplitudes of its lines, from the training records.
@@ -31,24 +31,24 @@ pub struct FittedModel {
     pub free: Mode,
 }
 
-/// What a model leaves of a record.
+/// Residual of a model on a record.
 #[derive(Clone)]
 pub struct RecordResidual {
     /// The record, with the initial state found for this model.
     pub record: StandRecord,
-    /// Measured less modelled over the record's range, nuisance terms removed.
+    /// Measured minus modelled record over the range, without nuisance terms.
     pub samples: Vec<f64>,
-    /// The modelled record over the range, without the nuisance terms; of free ringing with them.
+    /// The modelled record over the range, without the nuisance terms; for a free decay with them.
     pub modelled: Vec<f64>,
     pub nuisance: NuisanceFit,
 }
 
-/// How far a fit goes.
+/// Effort of a fit.
 #[derive(Clone, Copy)]
 pub struct FitEffort {
-    /// Iterations, each with one evaluation per parameter and one more.
+    /// Maximum iterations, each with one evaluation per parameter and one more.
     pub iterations: usize,
-    /// Whether the fit is repeated once the motion at the start of the records has been corrected.
+    /// Whether to repeat the fit after correcting the initial states of the records.
     pub corrects_start: bool,
 }
 
@@ -72,15 +72,15 @@ impl FitEffort {
 
 /// Relative reduction of the sum of squares at which a fit has converged.
 const TOLERANCE: f64 = 1e-6;
-/// Correction of the motion at a record's start, over the rms of the residual, that makes a second fit worthwhile.
+/// Correction of a record's initial state, relative to the RMS residual, that makes a second fit worthwhile.
 const START_MATTERS: f64 = 0.05;
-/// Such steps, or fits after them, at most.
+/// Maximum number of such corrections or refits.
 pub(super) const MOST_STARTS: usize = 8;
-/// Relative reduction of the sum of squares by one that makes the next one worthwhile: a start that was fitted without the
-/// effect is corrected in part only, as long as the effect's size is wrong for it.
+/// Relative reduction of the sum of squares by a correction that makes the next one worthwhile: an initial state fitted
+/// without the effect is corrected only in part while the magnitude of the effect is wrong.
 pub(super) const START_SETTLED: f64 = 0.01;
 
-/// Fits a model from start values, or from the bounds of those beyond them.
+/// Fits a model from start values, clamped to their bounds.
 ///
 /// # Errors
 /// If the model cannot be evaluated at the start.
@@ -94,9 +94,9 @@ pub fn fit(
     let start = &inside(&structure, start)[..];
     let start_model = structure.model(start).0;
     let mut free = start_model.free_mode();
-    // Where the motion is integrated, its start is corrected instead.
+    // For an integrated motion, the initial state is corrected instead.
     let integrates = start_model.is_integrated();
-    // Of a plain stand that rings freely, the mode of that motion is all there is to fit.
+    // For the free decay of a plain stand, the mode of that motion is all there is to fit.
     let rings = !integrates && records.iter().any(StandRecord::is_free);
     let fixed = (!rings).then_some(&free);
     let (mut found, mut modes_move) = minimize(&mut structure, start, &mut records, fixed, effort)?;
@@ -105,7 +105,8 @@ pub fn fit(
     }
     if effort.corrects_start && !rings {
         if !integrates && moves_on(&structure, &found.values, &records, &free) {
-            // Where it is gone before the end of a plain stand's record, the mode that was found is near enough for it.
+            // If the free motion of a plain stand's record decays before its end, the mode found is accurate enough for
+            // it.
             let follows = !structure.effects.is_empty() || lasts(&records, &free);
             free = structure.model(&found.values).0.free_mode();
             let values = &found.values[..start.len()];
@@ -147,9 +148,9 @@ pub fn fit(
     })
 }
 
-/// Minimises the residual without what belongs to the records; the free motion in it is in a given mode, which is faster, or
-/// in that of the parameters. The state at the start of free ringing that is integrated is found along with these: all of the
-/// motion follows from it, and not in proportion.
+/// Minimises the residual without the nuisance terms; the free motion in them is in a fixed mode, which is faster, or
+/// in that of the parameters. For an integrated free decay, the initial state is fitted as well, as the whole motion
+/// depends on it nonlinearly.
 fn minimize(
     structure: &mut Structure,
     start: &[f64],
@@ -181,7 +182,8 @@ fn minimize(
     Ok((found, modes_move))
 }
 
-/// Values within the bounds of a structure: what may be of either sign in one form of an effect need not be in another.
+/// Values clamped to the bounds of a structure: a parameter of either sign in one form of an effect may be one-sided in
+/// another.
 fn inside(structure: &Structure, values: &[f64]) -> Vec<f64> {
     let both = values.iter().zip(structure.bounds());
     both.map(|(value, [lower, upper])| value.clamp(lower, upper))
@@ -201,7 +203,7 @@ impl RecordResidual {
     }
 }
 
-/// Mean square of the raw residual of a record, and the nuisance terms in it.
+/// Mean square of the raw residual of a record, and its nuisance terms.
 fn nuisance_of(
     (model, terms): &(Chain, NuisanceTerms),
     record: &StandRecord,
@@ -213,7 +215,7 @@ fn nuisance_of(
     Some((mean_square, nuisance.fit(&mut residual)))
 }
 
-/// Searches the motion at the start of each record again; whether that changes any record.
+/// Re-estimates the initial state of each record; returns whether any record changed.
 fn correct_starts(
     structure: &Structure,
     values: &[f64],
@@ -236,8 +238,8 @@ fn correct_starts(
     matters
 }
 
-/// Whether the free motion after the start of a record differs by more than the residual allows from one in the mode that
-/// the parameters have by now: ten thousand turns in the plain stand's mode are not those in a mode 1 % beside it.
+/// Whether the free motion at the start of a record deviates by more than the residual allows from one in the mode of
+/// the current parameters: over ten thousand turns, a mode 1 % off loses its phase.
 fn moves_on(structure: &Structure, values: &[f64], records: &[StandRecord], free: &Mode) -> bool {
     let model = structure.model(values);
     let now = model.0.free_mode();
@@ -256,7 +258,7 @@ fn moves_on(structure: &Structure, values: &[f64], records: &[StandRecord], free
     })
 }
 
-/// Whether a free motion is still there at the end of a record: more than a thousandth of it.
+/// Whether more than a thousandth of a free motion remains at the end of a record.
 fn lasts(records: &[StandRecord], free: &Mode) -> bool {
     let fades = |record: &StandRecord| {
         free.damping_ratio * free.omega_rad_s * record.range.end as f64 / record.rate_hz()
@@ -288,7 +290,7 @@ fn line_amplitudes(
 }
 
 impl InitialState {
-    /// Adds a displacement, and a speed over the free motion's `ω₀`, to the motion at the first sample.
+    /// Adds a displacement, and a speed over the free motion's `ω₀`, to the initial state.
     pub(super) fn correct(&mut self, [x, speed]: [f64; 2], free: &Mode) {
         self.motion.x += x;
         self.motion.speed += speed * free.omega_rad_s;
@@ -296,7 +298,7 @@ impl InitialState {
 }
 
 impl FittedModel {
-    /// The same model fitted again, from where this fit ended.
+    /// Refits the same model from where this fit ended.
     pub fn refit(&self, train: &[StandRecord], effort: FitEffort) -> Result<Self, FitError> {
         let train = self.with_initial_states(train);
         fit(self.structure.clone(), &self.values, &train, effort)
@@ -314,17 +316,17 @@ impl FittedModel {
         self.structure.model(&self.values).0.is_integrated()
     }
 
-    /// The mode of the plain stand in it.
+    /// Mode of its plain stand.
     pub fn mode(&self) -> Mode {
         self.structure.mode(&self.values).0
     }
 
-    /// The plain stand in it.
+    /// Its plain stand.
     pub fn stand(&self) -> PlainStand {
         self.structure.stand(&self.values)
     }
 
-    /// What belongs to a record. What the state at the start of free ringing that is integrated can change follows from the model.
+    /// Nuisance terms of a record. The initial state of an integrated free decay is part of the model instead.
     pub fn nuisance(&self, record: &StandRecord, terms: &NuisanceTerms) -> Nuisance {
         let slopes = || {
             let model = RecordModel::of(&self.structure, &self.values, self.free);
@@ -334,8 +336,8 @@ impl FittedModel {
         record.nuisance(&self.free, terms, rings.then(slopes).flatten())
     }
 
-    /// What the fitted model leaves of a record: the record's own constants, initial state and phases are estimated,
-    /// nothing else. `None` if the motion diverges.
+    /// Residual of the fitted model on a record, with only the record's own constants, initial state and phases
+    /// estimated. `None` if the motion diverges.
     pub fn residual(&self, record: &StandRecord) -> Option<RecordResidual> {
         let model = RecordModel::of(&self.structure, &self.values, self.free);
         let mut found = model.settled(record)?;
@@ -344,7 +346,7 @@ impl FittedModel {
     }
 
     /// The phase of a line belongs to the record, its amplitude to the stand: undoes the difference between the
-    /// amplitude that was removed and the fitted one.
+    /// removed and the fitted amplitude.
     fn restore_amplitudes(&self, terms: &NuisanceTerms, found: &mut RecordResidual) {
         let rate_hz = found.record.rate_hz();
         let lines = terms.lines_hz.iter().zip(&found.nuisance.lines);

@@ -1,4 +1,4 @@
-//! Guard models: laws that are not offered as effects. An effect is not named where one of them explains what it leaves.
+//! Guard models: laws that are not offered as effects. An effect is not named where one of them explains its residual.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -31,15 +31,16 @@ pub struct GuardModel {
     pub model: ScoredModel,
 }
 
-/// Minimum significance with which a guard model leaves less than an effect.
+/// Minimum significance of a guard model's improvement over an effect.
 const LEAST_SIGNIFICANCE: f64 = 3.0;
 /// Minimum reduction of the criterion from an effect to a guard model.
 const LEAST_REDUCTION: f64 = 20.0;
-/// Largest part of an effect's excess error power that a guard model may leave: a law that explains half of it is not its cause.
+/// Largest fraction of an effect's excess error power that a guard model may leave: a law that explains half of it is
+/// not its cause.
 const LEFT: f64 = 0.5;
 
 impl GuardModel {
-    /// All of them beside a base model.
+    /// Fits of all guard models added to a base model.
     pub fn fits(base: &BaseModel, records: &Records, workers: Workers) -> Vec<ScoredModel> {
         let forms = EffectForm::all(RIVALS.iter().copied());
         let workers = workers.silent();
@@ -47,8 +48,8 @@ impl GuardModel {
         fits.into_iter().flatten().collect()
     }
 
-    /// The one that explains most, if it passes as an effect would and leaves significantly less than the accepted
-    /// effect, if any.
+    /// The guard model that explains most, if it passes as an effect would and has a significantly smaller
+    /// residual than the accepted effect, if any.
     pub fn best(
         fits: Vec<ScoredModel>,
         base: &ScoredModel,
@@ -73,7 +74,7 @@ impl GuardModel {
         })
     }
 
-    /// Why a candidate is not accepted beside this law.
+    /// Why a candidate is not accepted because of this law.
     pub fn instead_of(&self, candidate: &CandidateFit) -> Reason {
         let error = candidate.model.as_ref().map(ScoredModel::compared_rms);
         Reason::GuardModel {

@@ -1,9 +1,10 @@
-//! A body without a spring. How far it moves does not follow from what acts: the smallest error of a force adds up without end.
+//! A body without a spring. Its displacement cannot be predicted from the applied quantity, as the smallest force error
+//! accumulates without limit.
 //!
-//! So the body and its model are both held to the measured motion `y` by a spring of known stiffness `k`: with
-//! `J x'' + f x' + n = u`, also `J x'' + f x' + n + k x = u + k y`. What is on the right is known, and the equation is that of
-//! a stand whose gain is known, to which everything else applies. In the unit of what acts, `k x` is the record; what the
-//! model leaves of it is the force that it lacks, below the frequency `√(k/J)`.
+//! So body and model are both tied to the measured motion `y` by a spring of known stiffness `k`: with
+//! `J x'' + f x' + n = u`, also `J x'' + f x' + n + k x = u + k y`. The right-hand side is known, and the equation is
+//! that of a stand of known gain, to which everything else applies. In units of the applied quantity, `k x` is the
+//! record; its residual is the missing force below the frequency `√(k/J)`.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -23,28 +24,29 @@ use crate::identify::Motion;
 use crate::print::{rounded, unit_or_as_recorded};
 use crate::warning::Warning;
 
-/// The holding spring's force over what acts, rms. The body is then held at four times the frequency at which its inertia takes
-/// what acts.
+/// RMS force of the tying spring relative to the applied quantity. The resulting natural frequency is four times the
+/// frequency at which the inertia balances the applied quantity.
 const HOLD: f64 = 16.0;
-/// A spring's force over what acts, rms, up to which the body counts as free.
+/// RMS force of the body's own spring, relative to the applied quantity, up to which the body
+/// counts as free.
 const SMALL_SPRING: f64 = 0.1;
-/// Frequency of the held body over that of the weak spring with which a stand file describes the free one: that
-/// spring takes a millionth of what the holding one does.
+/// Ratio of the natural frequency with the tying spring to that with the weak spring of a stand file for a free
+/// body: that spring carries a millionth of the tying one.
 const WEAKER: f64 = 1e3;
 
-/// A body without a spring that is held to its measured motion.
+/// A body without a spring, tied to its measured motion.
 #[derive(Debug, Clone)]
 pub struct HeldBody {
-    /// What holds it, in SI units of what acts and of the motion.
+    /// Stiffness of the tying spring, in SI units of applied quantity and motion.
     pub stiffness: f64,
     /// Units of the channels as they were recorded.
     pub recorded: ChannelUnits,
 }
 
-/// A case with the body held, and the context for it; `None` unless the records are of a body without a spring.
+/// A case with the tied body, and its context; `None` unless the records are of a body without a spring.
 ///
 /// # Errors
-/// If the plain stand cannot be fitted to the body as it is held.
+/// If the plain stand cannot be fitted to the tied body.
 pub fn hold(case: &Case, unscaled: &FitContext) -> Result<Option<(Case, FitContext)>, Failure> {
     if case.declared.is_some() || case.gain_is_declared || case.recorder.is_some() {
         return Ok(None);
@@ -73,7 +75,7 @@ pub fn hold(case: &Case, unscaled: &FitContext) -> Result<Option<(Case, FitConte
         }),
         ..unscaled.clone()
     };
-    // A spring of its own makes the whole stiffer than the one that holds it: the gain is then less than 1.
+    // A spring of its own makes the total stiffer than the tying spring, so the gain is less than 1.
     let Ok(with_spring) = find_plain(&context, None, &records.train) else {
         return Ok(None);
     };
@@ -120,7 +122,7 @@ fn warning(context: &FitContext, stiffness: f64) -> Warning {
     )
 }
 
-/// Rms of several series together, each about its mean.
+/// RMS of several series together, each about its mean.
 fn rms<'a>(series: impl Iterator<Item = &'a [f64]>) -> f64 {
     let (mut sum, mut count) = (0.0, 0_usize);
     for values in series {
@@ -131,7 +133,7 @@ fn rms<'a>(series: impl Iterator<Item = &'a [f64]>) -> f64 {
 }
 
 impl StandRecord {
-    /// The record of the body held by a spring to what was measured, about a mean.
+    /// The record of the body tied by a spring to the measured motion, about a mean.
     fn held(&self, stiffness: f64, mean: f64) -> Self {
         let input = &self.input;
         let spring: Vec<f64> = self
@@ -153,14 +155,14 @@ impl StandRecord {
 }
 
 impl HeldBody {
-    /// Rms of what acts on the body itself, without the spring, on some records.
+    /// RMS of the applied quantity on the body itself, without the spring, over some records.
     pub fn acting_rms<'a>(records: impl Iterator<Item = &'a StandRecord>) -> f64 {
         let all: Vec<Vec<f64>> = records.map(StandRecord::acting_in_range).collect();
         rms(all.iter().map(Vec::as_slice))
     }
 
     /// Inertia `k/ω²` and damping `2ζk/ω` of the body, in the units of the files, from natural frequency and damping
-    /// ratio as it is held.
+    /// ratio of the tied body.
     pub fn constants(&self, [natural_hz, ratio]: [&Estimate; 2]) -> [Estimate; 2] {
         let units = &self.recorded;
         let omega = TAU * natural_hz.value();
@@ -197,8 +199,8 @@ impl HeldBody {
         ]
     }
 
-    /// Factor that makes a parameter of an effect beside the holding spring, measured in units of what acts to a power,
-    /// one beside the weak spring, in units of the motion.
+    /// Conversion factor of an effect's parameter with a power of the record unit, from the tied body (units of the
+    /// applied quantity) to the weak spring (units of the motion).
     pub fn weakly(&self, power_of_recorded: i32, is_size: bool) -> f64 {
         let size = if is_size { WEAKER * WEAKER } else { 1.0 };
         size * self.stiffness.powi(-power_of_recorded)
@@ -206,8 +208,8 @@ impl HeldBody {
 }
 
 impl EffectForm {
-    /// Whether it is a torque beside the record that grows in proportion to its first parameter: such a one means the same
-    /// beside any spring, and in a body without one.
+    /// Whether it is a torque in addition to the record and proportional to its first parameter: it then means the same
+    /// with any spring, and without one.
     pub fn needs_no_spring(&self) -> bool {
         let Some(start) = self.form.starts.first().filter(|start| !start.is_empty()) else {
             return false;
@@ -225,7 +227,7 @@ impl EffectForm {
             let mut memory: Memory = torque.begin(0.0);
             Some(torque.value(&mut memory, 0.3 * size, 0.7 * size))
         };
-        // In small motions and in large ones.
+        // For small and for large motions.
         [1e-3, 1.0].into_iter().all(|size| {
             let both = torque(1.0, size).zip(torque(2.0, size));
             both.is_some_and(|(once, twice)| {

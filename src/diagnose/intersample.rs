@@ -1,5 +1,5 @@
-//! Whether the course of the input between its samples looks like an effect: a converter that holds its samples delays by
-//! half a sample, straight lines attenuate high frequencies.
+//! Tests whether the waveform of the input between its samples is mistaken for an effect: a converter's hold delays by
+//! half a sample, linear interpolation attenuates high frequencies.
 
 use torqcomp_model::simulate::Between;
 
@@ -10,18 +10,19 @@ use super::search::refusal;
 use crate::parallel::parallel;
 use torqcomp_dsp::dot;
 
-/// Largest part of a model's excess error power that may remain with another course of the input.
+/// Largest fraction of a model's excess error power that may remain with another waveform.
 const LEFT: f64 = 0.5;
 
-/// Change beside a jump, over the jump, up to which there are plateaus on both sides of it.
+/// Change next to a jump, relative to the jump, up to which there are plateaus on both sides of it.
 const LEVEL: f64 = 0.15;
-/// Part of the squared changes of an input of plateaus that are jumps.
+/// Fraction of the squared changes of a plateau input that are jumps.
 const MOSTLY_JUMPS: f64 = 0.9;
-/// Their rms over that of the input, below which they are steps of a converter in a slow signal.
+/// RMS of the jumps relative to the input, below which they are quantisation steps of a slow
+/// signal.
 const SMALL: f64 = 0.1;
 
-/// The course that the inputs show by themselves. Plateaus with jumps from one sample to the next need frequencies without limit
-/// and are held; everything else is taken to be band-limited until the records say otherwise.
+/// Waveform evident from the inputs themselves. Plateaus with jumps between samples have unlimited bandwidth and are
+/// held; anything else is taken to be band-limited unless the records show otherwise.
 pub fn from_inputs(records: &[StandRecord]) -> Between {
     let mut driven = records.iter().filter(|r| !r.is_free()).peekable();
     let are_driven = driven.peek().is_some();
@@ -31,7 +32,7 @@ pub fn from_inputs(records: &[StandRecord]) -> Between {
     }
 }
 
-/// Mean square of the noise on an input of plateaus: half that of the changes on them. `None` if the input has none.
+/// Mean square of the noise on a plateau input: half that of the changes on the plateaus. `None` without plateaus.
 pub fn noise_on_plateaus(input: &[f64]) -> Option<f64> {
     let changes: Vec<f64> = input.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let is_jump = |near: &&[f64]| near[0].abs().max(near[2].abs()) <= LEVEL * near[1].abs();
@@ -43,7 +44,7 @@ pub fn noise_on_plateaus(input: &[f64]) -> Option<f64> {
     let is_seen = jumps > 0.0
         && jumps >= MOSTLY_JUMPS * all
         && jumps >= SMALL * SMALL * power * squares.len() as f64;
-    // Of the changes on plateaus a few look like jumps, but not by their size.
+    // Some noise changes on plateaus look like jumps, but not by their size.
     is_seen.then(|| {
         let mut small: Vec<f64> = changes.iter().map(|c| c * c).collect();
         small.sort_by(f64::total_cmp);
@@ -52,8 +53,8 @@ pub fn noise_on_plateaus(input: &[f64]) -> Option<f64> {
     })
 }
 
-/// The course of the input, other than the present one, with which one of the models explains more for its parameters than the
-/// last one. A course has no parameter that could adapt it to an effect.
+/// The waveform other than the present one with which one of the models explains more for its parameters than the last
+/// one. A waveform has no parameter that could adapt it to an effect.
 pub fn better_course(
     models: &[&ScoredModel],
     last: &ScoredModel,
@@ -95,7 +96,7 @@ mod tests {
         assert!(has_plateaus(&made(&|i| level(i) + 0.05 * noise(i))));
         assert!(!has_plateaus(&made(&|i| (0.3 * i as f64).sin())));
         assert!(!has_plateaus(&made(&|i| level(7 * i))));
-        // A slow sine in steps of a converter, and single values that stand out.
+        // A slow quantised sine, and isolated outliers.
         assert!(!has_plateaus(&made(&|i| (100.0
             * (0.001 * i as f64).sin())
         .round())));

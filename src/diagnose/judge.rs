@@ -1,4 +1,5 @@
-//! The errors on the held-out records. Everything was chosen by the training records; what the others do not show goes again.
+//! Hold-out errors. Selection uses the training records only; effects not confirmed by the held-out records are
+//! removed.
 
 use super::SearchState;
 use super::guard_models::GuardModel;
@@ -14,7 +15,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::parallel::parallel;
 
 impl SearchState {
-    /// Takes the errors of all models on the held-out records of a case, and takes out the effects that these do not show.
+    /// Computes the hold-out errors of all models, and removes the effects that the held-out records do not confirm.
     ///
     /// # Errors
     /// If the plain stand cannot be run on them.
@@ -55,7 +56,7 @@ impl SearchState {
         }
         self.tests = super::tests(&self.after);
         let after_rms = self.after.compared_rms();
-        // A law that leaves more of the held-out records is none that they bear out.
+        // A guard model with a larger hold-out error is not confirmed.
         let is_borne_out = |guard: &GuardModel| guard.model.compared_rms() < after_rms;
         self.suspected = self.suspected.take().filter(is_borne_out);
         self.lower_noise_floor();
@@ -72,7 +73,7 @@ impl SearchState {
         model.clone().compared_on_holdout(&self.records)
     }
 
-    /// The errors of all candidates.
+    /// Hold-out errors of all candidates.
     fn judge_candidates(&mut self, threads: usize) {
         let all: Vec<&CandidateFit> = self.rounds.iter().flatten().collect();
         let judged = parallel(all.len(), threads, |k| {
@@ -86,7 +87,7 @@ impl SearchState {
         }
     }
 
-    /// Takes out the effects that the held-out records do not show.
+    /// Removes the effects that the held-out records do not confirm.
     fn confirm(&mut self, threads: usize) {
         self.eliminate(threads);
         if self.after.effect_names().len() == 1 && no_gain(&self.after, &self.before).is_some() {
@@ -95,7 +96,7 @@ impl SearchState {
         }
     }
 
-    /// Goes back to the plain stand.
+    /// Reverts to the plain stand.
     fn drop_all(&mut self, reason: &Reason) {
         let names = self.after.effect_names();
         for round in &mut self.rounds {
@@ -104,8 +105,8 @@ impl SearchState {
                 candidate.reason = reason.clone();
             }
         }
-        // A line or a drift belongs to its record, and noise that rings or wanders may look like one: that it is not in the
-        // others is no contradiction.
+        // A line or a drift belongs to its record, and correlated noise may look like one: its absence in other records
+        // is no contradiction.
         let added = self.after.fitted.structure.added();
         self.is_refuted = !added.iter().all(EffectForm::is_disturbance);
         self.without.clear();

@@ -1,5 +1,5 @@
-//! Known loads that were put on slowly, held against what a diagnosis found: the gain that free ringing does not show, and
-//! whether the stand bends under them as the effects say. No effect is fitted to them.
+//! Check of a diagnosis against quasi-static known loads: the gain, which a free decay does not show, and the static
+//! nonlinearity that the effects imply. No effect is fitted to them.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -14,20 +14,20 @@ use crate::failure::{ErrorCode, Failure};
 use crate::print::{rounded, with_std};
 use crate::warning::Warning;
 
-/// Loads and readings, in SI units, in the order in which they were taken.
+/// Loads and readings, in SI units, in the order of measurement.
 pub struct KnownLoads {
     pub source: String,
     pub applied: Vec<f64>,
     pub measured: Vec<f64>,
 }
 
-/// Most loads of a file that are put on the model one by one; of more, neighbours count with their means.
+/// Maximum number of loads of a file that are simulated; of more, adjacent ones are averaged.
 const MOST: usize = 256;
-/// Fewest different loads.
+/// Minimum number of different loads.
 const FEWEST: usize = 3;
-/// Probability with which the scatter about two models differs by chance, up to which one is worse.
+/// Significance level of the test that one of two models scatters more.
 const BY_CHANCE: f64 = 0.01;
-/// Standard uncertainties, and part of the gain, by which two gains differ.
+/// Minimum difference of two gains, in standard uncertainties and relative to the gain.
 const GAINS_DIFFER: (f64, f64) = (3.0, 1e-3);
 
 /// What known loads say.
@@ -95,14 +95,14 @@ impl KnownLoads {
     }
 }
 
-/// The gain by the loads in all files, and the rms of what is left of each.
+/// The gain from the loads in all files, and the RMS residual of each.
 struct LoadFit {
     gain: (f64, Option<f64>),
     rms: Vec<f64>,
 }
 
 impl LoadFit {
-    /// Fits gain and the zero of each file to a chain with a gain of 1.
+    /// Fits the gain and the zero of each file to a chain with a gain of 1.
     fn of(loads: &[KnownLoads], chain: &Chain) -> Result<Self, FitError> {
         let slope = slope(loads);
         let left = |k: usize, values: &[f64]| -> Vec<f64> {
@@ -143,7 +143,7 @@ impl LoadFit {
         })
     }
 
-    /// The same for the stand of a model; to the uncertainty of the gain comes that of the effects' parameters.
+    /// The same for the stand of a model; the uncertainty of the gain includes that of the effects' parameters.
     fn of_model(loads: &[KnownLoads], fitted: &FittedModel) -> Result<Self, FitError> {
         let with = |values: &[f64]| {
             let (mut chain, _) = fitted.structure.model(values);
@@ -173,7 +173,7 @@ impl LoadFit {
     }
 }
 
-/// Slope of the straight lines through the loads of each file, with one slope for all.
+/// Common slope of the straight lines through the loads of all files.
 fn slope(loads: &[KnownLoads]) -> f64 {
     let (mut products, mut squares) = (0.0, 0.0);
     for file in loads {
@@ -188,10 +188,11 @@ fn slope(loads: &[KnownLoads]) -> f64 {
 }
 
 impl Diagnosis {
-    /// Holds known loads against the stand that was found; `declared_gain` is that of the stand file or of the units, in SI.
+    /// Checks known loads against the stand that was found; `declared_gain` is that of the stand file or of the units,
+    /// in SI.
     ///
     /// # Errors
-    /// If the stand has no reading at rest, or does not follow the loads.
+    /// If the stand has no static reading, or does not follow the loads.
     pub fn check_loads(
         &mut self,
         loads: &[KnownLoads],
@@ -253,7 +254,7 @@ impl Diagnosis {
     }
 }
 
-/// Says that the loads give another gain than is known otherwise.
+/// Warns that the loads give a gain other than the declared or fitted one.
 fn gains_differ(
     (gain, gain_std): (f64, Option<f64>),
     (known, known_std): (f64, Option<f64>),
@@ -279,7 +280,7 @@ fn gains_differ(
     })
 }
 
-/// Says that the effects are wrong about the loads.
+/// Warns that the loads contradict the effects.
 fn contradicted(
     loads: &[KnownLoads],
     before: &LoadFit,

@@ -1,4 +1,5 @@
-//! Effects taken out again: which ones a model needs, what each explains, and the errors with none, with one, with two.
+//! Backward elimination of effects: which ones a model needs, what each explains, and the errors with none, one, two
+//! and so on.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -9,7 +10,7 @@ use super::score::{RmsErrors, ScoredModel};
 use crate::parallel::parallel;
 use torqcomp_dsp::dot;
 
-/// A fit of a model from which effects were taken out.
+/// A refit of a model without some effects.
 const REPEATED: FitEffort = FitEffort::full(6);
 
 /// A number of effects, and the error that they leave.
@@ -54,7 +55,7 @@ pub struct Ladder {
 }
 
 impl FittedModel {
-    /// The model with some of the effects that were added to it, fitted again.
+    /// The model with some of its added effects only, refitted.
     pub fn with_only(&self, keep: impl Fn(usize) -> bool, records: &Records) -> Option<Self> {
         let declared = self.structure.declared;
         let keeps = |k: usize| k.checked_sub(declared).is_none_or(&keep);
@@ -65,7 +66,7 @@ impl FittedModel {
 }
 
 impl ScoredModel {
-    /// The model without each of the effects that were added to it, in turn; `None` where that cannot be fitted.
+    /// The model without each of its added effects, one at a time; `None` where that cannot be fitted.
     pub fn without_each(&self, records: &Records, threads: usize) -> Vec<Option<Self>> {
         parallel(self.fitted.structure.added().len(), threads, |k| {
             let less = self.fitted.with_only(|other| other != k, records)?;
@@ -73,7 +74,7 @@ impl ScoredModel {
         })
     }
 
-    /// The model with each of the effects that were added to it, alone.
+    /// The model with each of its added effects alone.
     fn each_alone(&self, records: &Records, threads: usize) -> Vec<Option<Self>> {
         parallel(self.fitted.structure.added().len(), threads, |k| {
             let alone = self.fitted.with_only(|other| other == k, records)?;
@@ -88,7 +89,7 @@ impl ScoredModel {
 }
 
 impl Ladder {
-    /// What the effects of a model explain; `without` is the model without each of them.
+    /// Contribution of each effect of a model; `without` is the model without each of them.
     pub fn of(
         after: &ScoredModel,
         before: &ScoredModel,
@@ -119,8 +120,8 @@ impl Ladder {
     }
 }
 
-/// The models from none of the effects to all: from the last one on, the effect goes whose absence the training records show
-/// least.
+/// The models from no effects to all: starting from the last, the effect whose removal affects the training records
+/// least goes first.
 fn steps(
     after: &ScoredModel,
     before: &ScoredModel,
@@ -155,7 +156,8 @@ fn steps(
     (0..models.len()).map(step).collect()
 }
 
-/// Between the changes of each effect alone. Of two, each alone is the model without the other.
+/// Correlations between the contributions of each effect alone. With two effects, each alone is the
+/// model without the other.
 fn correlations(
     after: &ScoredModel,
     before: &ScoredModel,

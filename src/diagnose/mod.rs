@@ -1,8 +1,8 @@
-//! Closing the loop: what the model leaves unexplained, the effect that causes it, and the error before and after.
+//! Diagnosis: the unexplained residual of the model, the effect that causes it, and the error before and after.
 //!
-//! [`run`] fits the plain stand ([`plain`]), adds effects ([`search`]) as long as they explain enough of the training records,
-//! takes the errors of what it found on the held-out ones ([`judge`]), and makes the [`Diagnosis`] of that ([`verdict`]), which
-//! is the JSON document of `diagnose`.
+//! [`run`] fits the plain stand ([`plain`]), adds effects ([`search`]) while they explain enough of the training
+//! records, evaluates the result on the held-out ones ([`judge`]), and summarises it in the [`Diagnosis`]
+//! ([`verdict`]), which is the JSON document of `diagnose`.
 
 mod alignment;
 mod applied_noise;
@@ -92,7 +92,7 @@ pub use surface::{ForceSurface, SurfacePlace, SurfacePoint};
 pub use units::ChannelUnits;
 pub use verdict::Verdict;
 
-/// What is diagnosed.
+/// Input of a diagnosis.
 pub struct Case {
     pub sources: SourceFiles,
     pub records: Records,
@@ -100,65 +100,66 @@ pub struct Case {
     pub declared: Option<PlainStand>,
     /// All modes of a stand that has several.
     pub several: Option<SeveralModes>,
-    /// The effects that it declares.
+    /// The declared effects.
     pub declared_effects: Vec<DeclaredForm>,
     /// Whether the gain is part of the declaration, not of the fit.
     pub gain_is_declared: bool,
-    /// What is recorded of the stand's motion.
+    /// Recorded quantity of the stand's motion.
     pub measures: Motion,
-    /// Whether it is known what torques in the stand do to the records.
+    /// Whether the response of the records to torques in the stand is known.
     pub sees_torques: bool,
-    /// The recorder as declared.
+    /// The declared recorder.
     pub recorder: Option<Fixed>,
     pub units: ChannelUnits,
     pub warnings: Vec<Warning>,
 }
 
-/// The state of a diagnosis with one course of the input between its samples. While it searches, it has no held-out
-/// records.
+/// State of a diagnosis with one waveform of the input between its samples. It has no held-out records during the
+/// search.
 struct SearchState {
     records: Records,
-    /// The stand file as it is.
+    /// The stand as declared.
     declared: Option<ScoredModel>,
     /// The plain stand, fitted.
     before: ScoredModel,
-    /// The same with the accepted effects.
+    /// The plain stand with the accepted effects.
     after: ScoredModel,
-    /// The same without each of its effects, once that is settled.
+    /// The same without each of its effects, once they are settled.
     without: Vec<Option<ScoredModel>>,
-    /// The laws beside the list beside the plain stand, with so many steps of integration.
+    /// The plain stand with each guard model, and the number of integration steps for them.
     rivals: Option<(usize, Vec<ScoredModel>)>,
-    /// The candidates; one list for each effect that was looked for.
+    /// The candidates; one list per round of the search.
     rounds: Vec<Vec<CandidateFit>>,
-    /// The models with effects on the way.
+    /// Intermediate models with effects.
     path: Vec<ScoredModel>,
-    /// What each of the effects explains.
+    /// Contribution of each effect.
     ladder: Ladder,
     /// A guard model that explains more than each candidate of the last round.
     suspected: Option<GuardModel>,
     /// A surface over the motion that explains more than the model.
     surface: Option<AskedSurface>,
     noise_floor: Option<NoiseFloor>,
-    /// Tests of the residual before.
+    /// Tests of the residual of the plain stand.
     tests_before: ResidualTests,
-    /// Tests of the residual after.
+    /// Tests of the residual of the final model.
     tests: ResidualTests,
-    /// Whether the error of the integration stays below what is left.
+    /// Whether the integration error is below the residual.
     settled: bool,
-    /// Whether the held-out records show none of the effects that the training records show.
+    /// Whether the held-out records confirm none of the effects found in the training records.
     is_refuted: bool,
     /// Whether a shift of the channels explains the records better than the effects.
     is_outdone: bool,
 }
 
-/// Power over the spectrum around it from which on a line of the residual is reported, and most such lines.
+/// Minimum power of a reported line of the residual relative to its surroundings, and maximum number of
+/// such lines.
 const PROMINENT: f64 = 30.0;
 const MOST_LINES: usize = 5;
 
-/// Single effects beside which another course of the input is tried.
+/// Number of single effects with which another waveform of the input is tried.
 const MOST_ALONE: usize = 8;
 
-/// Scales of the parameters for training records, without the natural frequency.
+/// Parameter scales of training records, without the natural frequency.
 fn scales(train: &[StandRecord]) -> RecordScales {
     let (mut sum, mut count, mut peak) = (0.0, 0_usize, 0.0_f64);
     for record in train {
@@ -285,7 +286,7 @@ impl SearchState {
         Ok(found)
     }
 
-    /// Measures the noise again, without what the model explains and what does not repeat with the input.
+    /// Re-estimates the noise without what the model explains and what is not periodic with the input.
     fn lower_noise_floor(&mut self) {
         let is_lower = |new: &NoiseFloor| {
             let old = self.noise_floor;
@@ -298,7 +299,8 @@ impl SearchState {
         }
     }
 
-    /// A course of the input between its samples that explains what is missing better than what was found.
+    /// A waveform of the input between its samples that explains the residual better than the current
+    /// model.
     fn other_course(&self, threads: usize) -> Option<Between> {
         let floor = self.noise_floor;
         let has_effects = !self.after.effect_names().is_empty();
@@ -314,7 +316,7 @@ impl SearchState {
             .filter_map(|c| c.model.as_ref())
             .collect();
         sort_by_number(&mut alone, |model| model.criterion());
-        // If nothing is left, only a course in place of effects could say more.
+        // If nothing is left, only a waveform in place of effects could explain more.
         let is_left = remains(&self.after, &self.tests, floor);
         let count = self.after.effect_names().len();
         let on_the_way = self.path.iter().chain(self.without.iter().flatten());
@@ -333,7 +335,7 @@ impl SearchState {
         intersample::better_course(&models, &self.after, noise_rms, &self.records, threads)
     }
 
-    /// Lines that stand out of the residual of a model.
+    /// Significant lines in the residual of a model.
     fn lines_of(&self, model: &ScoredModel) -> Vec<SpectralLine> {
         let to_hz = 0.49 * self.records.rate_hz();
         let mut lines = lines_of(&model.compared, to_hz, MOST_LINES);

@@ -1,8 +1,9 @@
-//! A stand that changes at a moment of a record: something came loose, cracked, or was touched.
+//! A stand that changes within a record: something came loose, cracked, or was touched.
 //!
-//! The record is cut in two and a stand is fitted to each part; the cut moves to where the first stand before it and the second
-//! one behind it leave least, until it stays. What changes in a record beside the stand (the level, or which frequencies are
-//! excited) must be alike on both sides, so that no missing effect is taken for a change.
+//! The record is split and a stand is fitted to each part; the split moves to where the first stand before it and the
+//! second one after it leave the smallest residual, until it converges. Anything that changes in a record besides the
+//! stand (level, or excited frequencies) must be alike on both sides, so that a missing effect is not mistaken for a
+//! change.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -17,17 +18,18 @@ use super::structure::{FitContext, Structure};
 use super::verdict::noise_rms;
 use torqcomp_dsp::dot;
 
-/// Where the first cut is tried, as parts of a record.
+/// Initial splits, as fractions of a record.
 const CUTS: [f64; 3] = [0.25, 0.5, 0.75];
-/// Rounds in which stands and cut are found in turn, at most.
+/// Maximum number of rounds of alternating fits of stands and split.
 const ROUNDS: usize = 8;
-/// Shortest part, in turns of the stand.
+/// Minimum length of a part, in periods of the stand.
 const SHORTEST_TURNS: f64 = 20.0;
-/// Power above the noise that two stands leave, over that of one, up to which the stand counts as changed.
+/// Residual power above the noise with two stands, relative to that with one, up to which the stand counts
+/// as changed.
 const LEFT: f64 = 0.1;
-/// Change of a constant in its standard uncertainties from which on it has changed.
+/// Minimum significant change of a constant, in standard uncertainties.
 const SIGNIFICANT: f64 = 5.0;
-/// Ratio of level or pitch of what is applied, from part to part, up to which the parts count as alike.
+/// Ratio of level or mean frequency of the input between the parts up to which they count as alike.
 const ALIKE: f64 = 1.25;
 
 const FIT: FitEffort = FitEffort::full(20);
@@ -66,7 +68,7 @@ pub struct ChangedConstant {
     pub after_std: Option<f64>,
 }
 
-/// A record cut in two, with a stand for each part.
+/// A split record, with a stand for each part.
 struct CutRecord {
     /// First sample of the second part.
     at: usize,
@@ -84,7 +86,7 @@ impl CutRecord {
         self.stands.iter().map(|stand| stand.train_sum).sum()
     }
 
-    /// What the stands leave with another cut; the second part begins with any motion.
+    /// Residual sum of squares with another split; the second part starts with any motion.
     fn sum_at(&self, record: &StandRecord, at: usize) -> Option<f64> {
         let parts = parts(record, at);
         let left = self.stands.iter().zip(&parts).map(|(stand, part)| {
@@ -94,8 +96,8 @@ impl CutRecord {
         left.sum()
     }
 
-    /// The same with the cut where the stands leave least: the motion takes some turns to become that of the second stand, over
-    /// which the first one leaves less at first.
+    /// The same with the split where the residual is smallest: the motion takes some periods to become that of the
+    /// second stand, during which the first one fits better.
     fn placed(
         self,
         context: &Arc<FitContext>,
@@ -124,7 +126,8 @@ fn parts(record: &StandRecord, at: usize) -> [StandRecord; 2] {
 }
 
 impl SearchState {
-    /// The change that explains most of what one stand leaves of a record; that is then no law of the motion.
+    /// The change that explains most of the residual of a single stand, which is then not due to a law of the
+    /// motion.
     pub(super) fn settle_change(&mut self) -> Option<ChangedStand> {
         let plain = &self.before.fitted;
         let context = &plain.structure.context;
@@ -152,7 +155,7 @@ impl SearchState {
     }
 }
 
-/// A change within a record, with the part of the error power above the noise that it leaves.
+/// A change within a record, with the fraction of the error power above the noise that remains.
 fn change_in(
     context: &Arc<FitContext>,
     record: &StandRecord,
@@ -200,7 +203,7 @@ fn stand_of(context: &Arc<FitContext>, record: &StandRecord) -> Option<FittedMod
     .ok()
 }
 
-/// The cut that stays, from one that is tried.
+/// The converged split, from an initial one.
 fn settled(
     context: &Arc<FitContext>,
     record: &StandRecord,
@@ -227,7 +230,7 @@ fn settled(
     best
 }
 
-/// Where the first stand before it and the second one from it on leave least.
+/// Where the first stand before the split and the second one after it leave the smallest residual.
 fn least(stands: &[FittedModel; 2], record: &StandRecord) -> Option<usize> {
     let [first, second] = stands.each_ref().map(|stand| stand.residual(record));
     let (first, second) = (first?.samples, second?.samples);
@@ -242,7 +245,8 @@ fn least(stands: &[FittedModel; 2], record: &StandRecord) -> Option<usize> {
     Some(best.1)
 }
 
-/// Whether level and pitch (rms of the slope over the rms) of what is applied are alike in both parts.
+/// Whether level and mean frequency (RMS of the slope over the RMS) of the input are alike in both
+/// parts.
 fn are_alike(record: &StandRecord, parts: &[Range<usize>; 2]) -> bool {
     let rms = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
     let [first, second] = parts.clone().map(|part| {
@@ -256,7 +260,7 @@ fn are_alike(record: &StandRecord, parts: &[Range<usize>; 2]) -> bool {
         .all(|ratio| (1.0 / ALIKE..=ALIKE).contains(&ratio))
 }
 
-/// The constants of two stands, if one of them changes significantly.
+/// The constants of two stands, if any changes significantly.
 fn changed(context: &FitContext, stands: &[FittedModel; 2]) -> Option<Vec<ChangedConstant>> {
     let (gain_unit, gain_scale) = context.units.gain();
     let named = [

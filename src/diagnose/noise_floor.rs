@@ -1,4 +1,4 @@
-//! The noise floor: what the best model of the stand must leave.
+//! Noise floor: the residual of a perfect model of the stand.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -28,34 +28,35 @@ pub enum NoiseFloorSource {
     OutOfBand,
 }
 
-/// Part of the input's power that may differ from period to period.
+/// Allowed relative difference of the input's power between periods.
 const SAME: f64 = 1e-5;
-/// Samples of the piece of the input whose repetition is looked for, if it varies enough.
+/// Length in samples of the piece of the input used to find its period, if it varies enough.
 const PIECE: usize = 256;
-/// Mean square of that piece about its mean, over that of the input: less repeats at any lag, as constant stretches do.
+/// Minimum mean square of that piece about its mean, relative to that of the input: less is repeated at any lag, as in
+/// constant intervals.
 const VARIES: f64 = 0.25;
 /// Shortest period, in samples.
 const SHORTEST: usize = 64;
-/// Largest part of the power out of band that the signal may have.
+/// Largest fraction of the out-of-band power that the signal may have.
 const SIGNAL: f64 = 0.2;
 
 /// Ratio of two parts of a spectrum up to which it is flat.
 const FLAT: f64 = 1.5;
-/// Most of the power of noise that a stand passes on: near no damping the integral is that of a ringing that never settles.
+/// Maximum noise power gain of a stand: near zero damping the integral corresponds to a decay that never settles.
 const MOST_PASSED: f64 = 10.0;
 
-/// Mean square of the noise, and the number of samples it is taken from.
+/// Mean square of the noise, and the number of samples used.
 type MeanSquare = (f64, usize);
 
-/// What a stand does to noise.
+/// Transmission of noise through a stand.
 pub struct NoisePassage {
     first: Mode,
-    /// Of each mode the part of white noise that it passes on, over the rate, and its factor.
+    /// For each mode, its fraction of white noise transmitted, per unit rate, and its factor.
     modes: Vec<[f64; 2]>,
 }
 
 impl NoisePassage {
-    /// Of a stand; of its displacement, speed or acceleration.
+    /// For a stand, and its displacement, speed or acceleration.
     pub fn of(stand: &ModalResponse, gain: f64, measures: Motion) -> Self {
         let of_mode = |part: &ModalPart| {
             let Mode {
@@ -71,9 +72,9 @@ impl NoisePassage {
         }
     }
 
-    /// Power of noise behind the stand, over that of white noise at a rate `f_s` before it: of each mode
-    /// `g² r² ω^2m π f₀ / (2 ζ f_s)`, as `∫ |H|² df = π f₀ / (4 ζ)` from 0 on, with `m` for the derivative of the displacement
-    /// that is recorded.
+    /// Power of noise after the stand, relative to that of white noise at a rate `f_s` before it: for each mode
+    /// `g² r² ω^2m π f₀ / (2 ζ f_s)`, as `∫ |H|² df = π f₀ / (4 ζ)` from 0 on, with `m` for the recorded derivative of
+    /// the displacement.
     fn passed(&self, rate_hz: f64) -> f64 {
         let modes = self.modes.iter();
         modes
@@ -83,7 +84,7 @@ impl NoisePassage {
 }
 
 impl FittedModel {
-    /// What its plain stand does to noise.
+    /// Transmission of noise through its plain stand.
     pub fn passage(&self) -> NoisePassage {
         let context = &self.structure.context;
         let chain = context.chain(&self.stand());
@@ -92,9 +93,9 @@ impl FittedModel {
 }
 
 impl NoiseFloor {
-    /// The noise of records: from the differences of periods where every input repeats, otherwise from the top of the
-    /// spectrum, where the plain stand's modelled record says that there is no signal. To either the noise on the applied
-    /// quantity is added as the stand passes it on: the records do not have it, what a model makes of the applied quantity has.
+    /// Noise of the records: from the differences between periods if every input is periodic, otherwise from the top of
+    /// the spectrum, where the plain stand predicts no signal. The noise on the applied quantity, filtered by the
+    /// stand, is added to either: it is not in the records, but in the response of a model to the recorded input.
     pub fn of(residuals: &[RecordResidual], passage: &NoisePassage) -> Option<Self> {
         let mode = &passage.first;
         let periods = residuals.iter().map(|r| {
@@ -108,8 +109,8 @@ impl NoiseFloor {
         measured.map(|floor| floor.with_applied(residuals, passage))
     }
 
-    /// The noise in the residuals of a model, from differences of periods: disturbances that do not repeat with the input,
-    /// such as mains pickup, are not in it if the model has them.
+    /// Noise in the residuals of a model, from differences between periods: disturbances that are not periodic with the
+    /// input, such as mains pickup, are excluded if the model includes them.
     pub fn of_residuals(residuals: &[RecordResidual], passage: &NoisePassage) -> Option<Self> {
         let found = residuals.iter();
         let found = found.map(|r| of_periods(&r.record, &r.samples, &passage.first));
@@ -117,7 +118,7 @@ impl NoiseFloor {
         Some(floor.with_applied(residuals, passage))
     }
 
-    /// Adds the noise on the applied quantity, as the stand passes it on.
+    /// Adds the noise on the applied quantity, filtered by the stand.
     fn with_applied(self, residuals: &[RecordResidual], passage: &NoisePassage) -> Self {
         let passed = |residual: &RecordResidual| {
             let record = &residual.record;
@@ -130,7 +131,7 @@ impl NoiseFloor {
         Self { rms, ..self }
     }
 
-    /// The noise of several records together; `None` if it is unknown for one of them.
+    /// Pooled noise of several records; `None` if it is unknown for one of them.
     fn pooled(
         found: impl Iterator<Item = Option<MeanSquare>>,
         from: NoiseFloorSource,
@@ -143,8 +144,8 @@ impl NoiseFloor {
     }
 }
 
-/// Mean square of the white noise on an applied quantity: what changes on its plateaus, or the flat top of its spectrum, if that
-/// is too low to be part of the excitation; otherwise none is known.
+/// Mean square of the white noise on an applied quantity: from the changes on its plateaus, or the flat top of its
+/// spectrum, if that is too low to be part of the excitation; otherwise 0.
 pub fn noise_of_input(input: &[f64]) -> f64 {
     if let Some(noise) = noise_on_plateaus(input) {
         return noise;
@@ -167,8 +168,8 @@ pub fn noise_of_input(input: &[f64]) -> f64 {
     }
 }
 
-/// Noise from differences of periods, over the samples before which the input has repeated for long enough that the
-/// motion has settled.
+/// Noise from differences between periods, over the samples before which the input has been periodic for long
+/// enough that the motion has settled.
 fn of_periods(record: &StandRecord, y: &[f64], mode: &Mode) -> Option<MeanSquare> {
     let u = record.applied_in_range();
     let period = period(u)?;
@@ -187,7 +188,7 @@ fn of_periods(record: &StandRecord, y: &[f64], mode: &Mode) -> Option<MeanSquare
     (count >= period).then(|| (0.5 * sum / f64::from(count as u32), count))
 }
 
-/// Length of the period of an input that repeats over a good part of it.
+/// Period of an input that is periodic over most of its length.
 fn period(u: &[f64]) -> Option<usize> {
     let energy = dot(u, u) / u.len() as f64;
     if energy == 0.0 {
@@ -203,7 +204,7 @@ fn period(u: &[f64]) -> Option<usize> {
     (SHORTEST..(u.len() - from).saturating_sub(piece.len())).find(near)
 }
 
-/// The samples from one on, as many as it takes until they vary like the whole input.
+/// As many samples from an index as vary like the whole input.
 fn varying_piece(u: &[f64], from: usize) -> Option<&[f64]> {
     let variance = |u: &[f64]| {
         let varying = without_mean(u);
@@ -215,7 +216,7 @@ fn varying_piece(u: &[f64], from: usize) -> Option<&[f64]> {
     pieces.find(|piece| variance(piece) >= least)
 }
 
-/// White noise with the level that the top of the spectrum has.
+/// White noise at the level of the top of the spectrum.
 fn out_of_band(residual: &RecordResidual) -> Option<MeanSquare> {
     let y = residual.record.measured_in_range();
     let length = (y.len() / 16).next_power_of_two().clamp(64, 2048);
@@ -258,7 +259,8 @@ mod tests {
 
     #[test]
     fn noise_through_a_stand() {
-        // π f₀/(2 ζ f_s) = π 2/(0.1 · 1000), and a second mode of half the part at 6 Hz, ζ = 0.1: a quarter of π 6/(0.2 · 1000).
+        // π f₀/(2 ζ f_s) = π 2/(0.1 · 1000), and a second mode of half the part at 6 Hz, ζ = 0.1: a quarter of π 6/(0.2
+        // · 1000).
         let one = PI * 2.0 / 100.0;
         assert!((passage().passed(RATE_HZ) - one).abs() < 1e-12);
         let part = |mode: Mode, residue| ModalPart {
@@ -277,7 +279,8 @@ mod tests {
         assert!((both.passed(RATE_HZ) - want).abs() < 1e-12);
     }
 
-    /// The stand's answer to steps of ±1 at these times: `1 − e^(−ζωt) (cos ω_d t + ζω/ω_d sin ω_d t)` for each.
+    /// Response of the stand to steps of ±1 at these times: `1 − e^(−ζωt) (cos ω_d t + ζω/ω_d sin ω_d t)` for
+    /// each.
     fn steps(times_s: &[f64], count: usize) -> RecordResidual {
         let mode = mode();
         let decay = mode.damping_ratio * mode.omega_rad_s;
@@ -294,8 +297,8 @@ mod tests {
         };
         let applied = (0..count).map(|i| sum(i, &|_| 1.0)).collect();
         let clean: Vec<f64> = (0..count).map(|i| sum(i, &answer)).collect();
-        // Numbers from −√3 to √3 have the standard deviation 1; multiples of the golden section fill any range evenly, and
-        // their squares lose the order of that.
+        // Numbers from −√3 to √3 have a standard deviation of 1; multiples of the golden ratio fill any range evenly,
+        // and using squares removes their order.
         let noise = |i: usize| 12_f64.sqrt() * ((0.618_034 * (i * i) as f64).fract() - 0.5);
         let noisy = clean.iter().enumerate().map(|(i, y)| y + NOISE * noise(i));
         let mut residual = RecordResidual::made(applied, noisy.collect(), Vec::new());
@@ -305,7 +308,7 @@ mod tests {
 
     #[test]
     fn the_floor_after_a_step_is_the_noise() {
-        // The plateaus are constant, the stand swings on them for 20 s.
+        // The plateaus are constant; the stand oscillates on them for 20 s.
         for times_s in [&[5.0][..], &[5.0, 20.0], &[1.0, 9.0, 17.0, 25.0]] {
             let floor = NoiseFloor::of(&[steps(times_s, 32_000)], &passage()).expect("a floor");
             let ratio = floor.rms / NOISE;
@@ -325,13 +328,13 @@ mod tests {
             assert!((0.0045..0.0055).contains(&found), "{found}");
             assert!(noise_of_input(&made(clean)).sqrt() < 1e-4);
         }
-        // White excitation is none.
+        // White excitation is not noise.
         assert!(noise_of_input(&made(&noise)) < 1e-12);
     }
 
     #[test]
     fn steps_that_repeat_give_the_noise_once_the_stand_has_settled() {
-        // From the second period on the input has repeated; 12 time constants, 19.1 s, later the motion has, too.
+        // The input is periodic from the second period on; 12 time constants, 19.1 s, later the motion is, too.
         let times_s: Vec<f64> = (0..40).map(|k| 1.5 * f64::from(k)).collect();
         let floor = NoiseFloor::of(&[steps(&times_s, 64_000)], &passage()).expect("a floor");
         assert_eq!(floor.from, NoiseFloorSource::Periods);

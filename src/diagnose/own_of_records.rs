@@ -1,4 +1,4 @@
-//! Parameters of a fit that belong to a record and not to the stand.
+//! Fit parameters that belong to a record rather than the stand.
 
 use torqcomp_model::Chain;
 use torqcomp_model::fit::Parameter;
@@ -6,25 +6,25 @@ use torqcomp_model::simulate::MotionState;
 
 use super::record::StandRecord;
 
-/// What a fit finds of each record: the displacement by a constant load where it matters, and the state at the start of free
-/// ringing that is integrated.
+/// Parameters fitted for each record: the displacement under a constant load where it matters, and the initial state of
+/// an integrated free decay.
 pub struct OwnOfRecords {
-    /// Size of a displacement.
+    /// Scale of displacement.
     size: f64,
-    /// Frequency that makes a speed a displacement.
+    /// Frequency that converts a speed to a displacement.
     omega_rad_s: f64,
     has_preload: bool,
-    /// Numbers of the records that ring.
+    /// Indices of the free-decay records.
     ringing: Vec<usize>,
 }
 
 impl OwnOfRecords {
-    /// Largest displacement by a constant load, over the rms of the record.
+    /// Largest displacement under a constant load, relative to the RMS of the record.
     pub const LARGEST_PRELOAD: f64 = 0.5;
-    /// Largest displacement at the start of free ringing, over the rms of the record.
+    /// Largest initial displacement of a free decay, relative to the RMS of the record.
     const LARGEST_STATE: f64 = 100.0;
 
-    /// For a model, and displacements of that size.
+    /// For a model, with a scale of displacement.
     pub fn of(model: &Chain, size: f64, records: &[StandRecord]) -> Self {
         let rings = |k: &usize| model.is_integrated() && records[*k].is_free();
         Self {
@@ -35,12 +35,12 @@ impl OwnOfRecords {
         }
     }
 
-    /// Whether a record, by its number, rings freely and is integrated.
+    /// Whether record `k` is an integrated free decay.
     pub fn is_ringing(&self, k: usize) -> bool {
         self.ringing.contains(&k)
     }
 
-    /// The parameters, from what the records have.
+    /// The parameters, starting from the records' values.
     pub fn parameters(&self, records: &[StandRecord]) -> Vec<Parameter> {
         let limit = Self::LARGEST_PRELOAD;
         let preload = |r: &StandRecord| within(r.initial.preload / self.size, [-limit, limit], 0.1);
@@ -58,7 +58,7 @@ impl OwnOfRecords {
         preloads.chain(states).collect()
     }
 
-    /// A record, by its number, with values of these parameters.
+    /// Record `k` with values of these parameters.
     pub fn set(&self, k: usize, record: &StandRecord, values: &[f64]) -> StandRecord {
         let mut record = record.clone();
         let preloads = match self.has_preload {

@@ -1,4 +1,4 @@
-//! Pairs of effects fitted together: what two effects leave shows neither of them clearly while the other is missing.
+//! Pairs of effects fitted together: the residual of two effects shows neither clearly while the other is missing.
 
 use super::fit::{FitEffort, FittedModel, fit};
 use super::records::Records;
@@ -8,38 +8,38 @@ use super::structure::{EffectForm, Structure};
 use crate::parallel::parallel;
 use torqcomp_dsp::{dot, sort_by_number};
 
-/// Forms of a pair of effects that are fitted.
+/// Number of forms of a pair of effects that are fitted.
 const FORMS: usize = 2;
-/// Pairs that get a first, a second and a full fit.
+/// Number of pairs that get a first, a second and a full fit.
 const FITTED: [usize; 3] = [10, 5, 3];
 const EFFORTS: [FitEffort; 3] = [
     FitEffort::brief(3),
     FitEffort::brief(5),
     FitEffort::full(15),
 ];
-/// Smallest and largest factor on the size of an effect in a pair, over its size alone.
+/// Limits of the magnitude of an effect in a pair, relative to its magnitude alone.
 const FACTORS: [f64; 2] = [0.1, 2.0];
 
-/// What an effect, fitted alone, changes of the training residuals.
+/// Change of the training residuals by an effect fitted alone.
 struct Change {
     effect: EffectForm,
-    /// Parameters of the plain stand less those of the base, and the effect's own.
+    /// Parameters of the plain stand minus those of the base, and the effect's own.
     plain: Vec<f64>,
     own: Vec<f64>,
-    /// Over all training records, without what the base's own parameters can change.
+    /// Over all training records, without what the base's own parameters can absorb.
     samples: Vec<f64>,
 }
 
-/// Two changes, and the sizes with which both together leave least.
+/// Two changes, and the magnitudes that minimise the residual of both together.
 struct EffectPair {
     members: [usize; 2],
     factors: [f64; 2],
-    /// Bayesian information criterion on the training records, less a constant, to first order.
+    /// Bayesian information criterion on the training records, up to a constant, to first order.
     criterion: f64,
 }
 
-/// Pairs of effects, the one with the smallest criterion first, of those for which it is smallest to first order.
-/// `alone` are fits of single effects beside the same base.
+/// Pairs of effects in ascending order of the criterion, preselected by its first-order value. `alone` are fits
+/// of single effects with the same base.
 pub fn best_pairs(
     base: &BaseModel,
     alone: &[ScoredModel],
@@ -101,7 +101,8 @@ impl Change {
 }
 
 impl EffectPair {
-    /// Structure and start values: each effect in its size of the pair, the plain stand moved by both.
+    /// Structure and start values: each effect with its magnitude in the pair, the plain stand changed
+    /// by both.
     fn start(&self, base: &BaseModel, changes: &[Change]) -> (Structure, Vec<f64>) {
         let fitted = &base.scored.fitted;
         let (mut structure, mut values) = (fitted.structure.clone(), fitted.values.clone());
@@ -122,7 +123,7 @@ impl EffectPair {
     }
 }
 
-/// All pairs of different effects, each in its best forms, the one with the smallest criterion first.
+/// All pairs of different effects, each in its best forms, in ascending order of the criterion.
 fn pairs(changes: &[Change], residual: &[f64]) -> Vec<EffectPair> {
     let (count, whole) = (residual.len() as f64, dot(residual, residual));
     let along: Vec<f64> = changes.iter().map(|c| dot(&c.samples, residual)).collect();
@@ -167,5 +168,5 @@ fn pairs(changes: &[Change], residual: &[f64]) -> Vec<EffectPair> {
     found
 }
 
-/// One less the squared correlation of two changes below which they count as one.
+/// Threshold of one minus the squared correlation of two changes, below which they count as one.
 const NEARLY_THE_SAME: f64 = 1e-4;

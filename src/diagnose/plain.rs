@@ -17,17 +17,17 @@ use torqcomp_dsp::{dot, peaks, sort_by_number};
 const PER_DECADE: f64 = 24.0;
 /// Damping ratios tried.
 const DAMPING: [f64; 4] = [0.01, 0.05, 0.2, 0.7];
-/// Damping ratios tried at a line of free ringing.
+/// Damping ratios tried at a line of a free decay.
 const RINGING: [f64; 5] = [3e-4, 1e-3, 3e-3, 0.01, 0.04];
-/// Factors of the declared frequency that are tried.
+/// Factors tried on the declared frequency.
 const NEAR: [f64; 9] = [0.5, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.4, 2.0];
-/// Starts that get a full fit.
+/// Number of starts that get a full fit.
 const FULL: usize = 3;
 
 const SEARCH: FitEffort = FitEffort::full(60);
 const REFINEMENT: FitEffort = FitEffort::full(10);
 
-/// Finds the plain stand that fits records best; the context for it.
+/// Finds the best-fitting plain stand of the records, and its context.
 ///
 /// # Errors
 /// If no start leads to a fit.
@@ -60,8 +60,8 @@ pub fn find_plain(
     Ok(found.at(best.stand()))
 }
 
-/// The plain stand of a context, fitted again with the samples and steps that the records have now; with the effects of the
-/// stand file, from their declared values on.
+/// The plain stand of a context, refitted with the current samples and steps of the records; with the effects of the
+/// stand file, starting from their declared values.
 ///
 /// # Errors
 /// If it cannot be fitted.
@@ -78,7 +78,8 @@ pub fn refine_plain(
         return fit_with_modes(structure, &values, train, REFINEMENT)
             .map_err(Failure::of(ErrorCode::NotIdentifiable));
     };
-    // The declared constants belong to the effects; those of a plain stand without effects may be nearer.
+    // The declared constants belong with the effects; those of a plain stand without effects may be
+    // closer.
     let fitted = DeclaredStand {
         plain: context.plain,
         ..declared
@@ -112,7 +113,7 @@ fn scan(
     found
 }
 
-/// A coarse grid of plain stands: near the declared one, or all that a record may show.
+/// A coarse grid of plain stands: near the declared one, or over the observable range.
 pub fn starts(
     context: &FitContext,
     declared: Option<PlainStand>,
@@ -142,8 +143,7 @@ pub fn starts(
     pairs.collect()
 }
 
-/// Plain stands at the strongest line of a record, which is that of a lightly damped resonance: between those of the grid such
-/// a damping fits none.
+/// Plain stands at the strongest line of a record, for a lightly damped resonance, which falls between the grid points.
 fn from_ringing(context: &FitContext, record: &StandRecord) -> Vec<PlainStand> {
     let y = without_mean(record.measured_in_range());
     let rate_hz = record.rate_hz();
@@ -159,7 +159,7 @@ fn from_ringing(context: &FitContext, record: &StandRecord) -> Vec<PlainStand> {
     line.map_or_else(Vec::new, |line| stand(line.frequency_hz).to_vec())
 }
 
-/// Sum of squares of a start; with its best gain, if that is free.
+/// Sum of squares of a start; with the optimum gain, if that is free.
 fn try_start(
     context: &FitContext,
     mut start: PlainStand,
@@ -191,7 +191,7 @@ fn try_start(
     Some((yy - 2.0 * xy + xx, start))
 }
 
-/// Sets the motion at the start of each record to that of the plain stand.
+/// Sets the initial state of each record to that of the plain stand.
 pub fn set_starts(plain: &FittedModel, records: &mut [StandRecord]) {
     let (model, _) = plain.structure.model(&plain.values);
     for record in records {

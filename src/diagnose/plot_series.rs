@@ -1,4 +1,4 @@
-//! Series that show how well models describe the held-out records: residuals in time, in frequency and over the motion.
+//! Plot series of the fit to the held-out records: residuals over time, frequency and motion.
 
 use std::ops::Range;
 
@@ -25,7 +25,7 @@ impl RecordResidual {
         record.input.start_s() + record.range.start as f64 / record.rate_hz()
     }
 
-    /// The modelled record, nuisance terms included.
+    /// The modelled record, including nuisance terms.
     pub fn prediction(&self) -> Vec<f64> {
         let measured = self.record.measured_in_range().iter();
         measured.zip(&self.samples).map(|(y, r)| y - r).collect()
@@ -35,11 +35,11 @@ impl RecordResidual {
         rms(&self.samples)
     }
 
-    /// So many samples around the largest part of the residual.
+    /// Range of `count` samples around the largest part of the residual.
     pub fn around_largest(&self, count: usize) -> Range<usize> {
         let all = self.samples.len();
         let count = count.min(all);
-        // The largest rms over a window a quarter as long, so that a single bad sample does not decide.
+        // The largest RMS over a window a quarter as long, so that a single bad sample does not decide.
         let window = (count / 4).max(1);
         let mut sum: f64 = self.samples[..window].iter().map(|r| r * r).sum();
         let (mut largest, mut place) = (sum, 0);
@@ -64,7 +64,7 @@ impl RecordResidual {
                 let rate_hz = self.record.rate_hz();
                 let mut speed: Vec<f64> =
                     differences(&x).iter().map(|d| 0.5 * d * rate_hz).collect();
-                // At the ends the difference is one of neighbours.
+                // One-sided differences at the ends.
                 if let [first, .., last] = &mut speed[..] {
                     *first *= 2.0;
                     *last *= 2.0;
@@ -75,7 +75,7 @@ impl RecordResidual {
     }
 }
 
-/// Length of the segments that the shortest of the records is cut into.
+/// Segment length for the shortest of the records.
 fn segment_length(residuals: &[RecordResidual]) -> usize {
     let shortest = residuals.iter().map(|r| r.samples.len()).min();
     let shortest = shortest.unwrap_or(0);
@@ -84,13 +84,13 @@ fn segment_length(residuals: &[RecordResidual]) -> usize {
         .min(shortest.max(2))
 }
 
-/// Frequencies from the first above zero, at a distance from each other.
+/// Frequency step and lowest frequency.
 fn frequency_step(residuals: &[RecordResidual], length: usize) -> f64 {
     residuals.first().map_or(1.0, |r| r.record.rate_hz()) / length as f64
 }
 
-/// Amplitude spectral density of the residuals, all records averaged: frequencies, and `√S(f)` in the unit of the record
-/// per `√Hz`.
+/// Amplitude spectral density of the residuals, averaged over all records: frequencies, and `√S(f)` in the unit of the
+/// record per `√Hz`.
 pub fn density(residuals: &[RecordResidual]) -> (Vec<f64>, Vec<f64>) {
     let length = segment_length(residuals);
     let mut power: Vec<f64> = Vec::new();
@@ -107,12 +107,12 @@ pub fn density(residuals: &[RecordResidual]) -> (Vec<f64>, Vec<f64>) {
         .unzip()
 }
 
-/// Minimum power of the input at a frequency, over that at the strongest, for an estimate of the response there.
+/// Minimum power of the input at a frequency, relative to the strongest, for a response estimate.
 const ENOUGH_INPUT: f64 = 1e-2;
 
 /// Magnitude of the response of a series to the applied quantity, `|Σ Y U*| / Σ |U|²` over the segments of all records,
-/// where the input has power. Estimates of measured and of modelled records are comparable: both have the errors of the
-/// estimator.
+/// where the input has power. Estimates for measured and modelled records are comparable, as both have the errors of
+/// the estimator.
 pub fn response(
     residuals: &[RecordResidual],
     of: impl Fn(&RecordResidual) -> Vec<f64>,
@@ -139,7 +139,7 @@ pub fn response(
         .unzip()
 }
 
-/// Autocorrelation of the residuals at lags from 0, all records together, and its 99 % bound for white noise.
+/// Autocorrelation of the residuals at lags from 0, over all records, and its 99 % bound for white noise.
 pub fn autocorrelation(residuals: &[RecordResidual], lags: usize) -> (Vec<f64>, f64) {
     let counts = residuals.iter().map(|r| r.samples.len());
     let lags = lags.min(counts.clone().min().unwrap_or(0).saturating_sub(1));
@@ -150,7 +150,7 @@ pub fn autocorrelation(residuals: &[RecordResidual], lags: usize) -> (Vec<f64>, 
     (shares, 2.576 / (total.max(1) as f64).sqrt())
 }
 
-/// Which part of the motion a residual is plotted over.
+/// Abscissa of a residual plot over the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MotionAxis {
     /// The modelled record about its mean.
@@ -159,22 +159,22 @@ pub enum MotionAxis {
     Speed,
 }
 
-/// The mean of a residual over a range of displacement or speed.
+/// Mean residual over a range of displacement or speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionBin {
-    /// Middle of the range.
+    /// Centre of the range.
     pub motion: f64,
     pub mean: f64,
     /// Standard error of the mean.
     pub std: f64,
 }
 
-/// Bins of a residual over the motion.
+/// Number of bins over the motion.
 const BINS: usize = 40;
-/// Minimum number of samples of a bin that is shown.
+/// Minimum number of samples of a displayed bin.
 const FEWEST: usize = 12;
 
-/// Mean of residuals over the displacement or speed of a model.
+/// Mean residuals over the displacement or speed of a model.
 pub fn binned(
     residuals: &[RecordResidual],
     model: &[RecordResidual],
@@ -222,7 +222,7 @@ pub fn binned(
 mod tests {
     use super::*;
 
-    /// A residual of a record at 1 kHz that is three times what was applied.
+    /// Residual of a record at 1 kHz, three times the applied quantity.
     fn residual(samples: Vec<f64>) -> RecordResidual {
         let applied = (0..samples.len()).map(|i| (0.013 * (i * i) as f64).sin());
         let applied: Vec<f64> = applied.collect();
@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn a_density_integrates_to_the_mean_square() {
-        // A sine of amplitude 2 has the mean square 2.
+        // A sine of amplitude 2 has a mean square of 2.
         let one = [residual(samples(8192, |i| 2.0 * (0.7 * i as f64).sin()))];
         let (lines_hz, density) = density(&one);
         let step = lines_hz[1] - lines_hz[0];

@@ -1,4 +1,4 @@
-//! Status of a candidate effect and the reason for it: both come from one [`Reason`].
+//! Status of a candidate effect and the reason for it: both follow from one [`Reason`].
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -109,7 +109,7 @@ impl Reason {
         }
     }
 
-    /// Whether the effect reduces the training error by more than chance.
+    /// Whether the effect significantly reduces the training error.
     pub fn is_significant(&self) -> bool {
         !matches!(
             self,
@@ -117,7 +117,7 @@ impl Reason {
         )
     }
 
-    /// The reason for people.
+    /// The reason as text.
     pub fn text(&self) -> String {
         match self {
             Self::NotFitted => {
@@ -178,14 +178,14 @@ impl Reason {
     }
 }
 
-/// An effect that explains what only the model has.
+/// An effect that only removes the response to input noise.
 const TAKES_OUT_NOISE: &str =
     "explains little but the noise of the applied quantity, of which it lets less through";
 
-/// What a surface over the motion is.
+/// Name of a surface over the motion.
 const OF_NO_LAW: &str = "a torque of no given law over displacement and speed";
 
-/// An effect that explains so many percent of the residual power only.
+/// An effect that explains only a few percent of the residual power.
 fn small_share(percent: f64) -> String {
     format!(
         "explains only {} % of the residual power: too little to distinguish from other model errors",
@@ -193,14 +193,14 @@ fn small_share(percent: f64) -> String {
     )
 }
 
-/// An effect that the held-out records do not bear out.
+/// An effect not confirmed by the held-out records.
 fn not_confirmed(change: &str) -> String {
     format!(
         "reduces the error of the training records, but that of the held-out ones changes by {change} only: not confirmed"
     )
 }
 
-/// A further effect that explains too little, with the least parts in percent.
+/// A further effect that explains too little, with the minimum shares in percent.
 fn too_little([least, least_of_rest, rest]: [f64; 3]) -> String {
     format!(
         "explains less than {least:.0} % of what the plain stand leaves above the noise (or less than {least_of_rest:.0} %, and \
@@ -208,13 +208,13 @@ fn too_little([least, least_of_rest, rest]: [f64; 3]) -> String {
     )
 }
 
-/// An effect behind a law that is not in the list.
+/// An effect surpassed by a law that is not in the list.
 fn beside_the_list(ratio: f64, law: &str, equation: &str) -> String {
     let law = format!("{law} ({equation}), a law that is not in the list of effects");
     worse(ratio, &law)
 }
 
-/// An effect that leaves more than the accepted ones.
+/// An effect with a larger residual than the accepted ones.
 fn worse(ratio: f64, best: &str) -> String {
     if ratio <= 1.0 {
         return format!("improves the fit, but not significantly more than {best}");
@@ -225,7 +225,7 @@ fn worse(ratio: f64, best: &str) -> String {
     )
 }
 
-/// A ratio of errors, above 1, in words.
+/// A ratio of errors above 1, as text.
 fn times(ratio: f64) -> String {
     match rounded(ratio, 3).as_str() {
         "1" => "slightly more than".to_owned(),
@@ -233,7 +233,7 @@ fn times(ratio: f64) -> String {
     }
 }
 
-/// Relative change from which on it is a factor.
+/// Relative change above which it is given as a factor.
 const LARGE_CHANGE: f64 = 10.0;
 
 /// A relative change in percent, with its sign; a large one as a factor.
@@ -271,7 +271,7 @@ impl From<Reason> for StatedReason {
 mod tests {
     use super::*;
 
-    /// A figure below 1 would contradict that the error is larger.
+    /// A ratio below 1 would contradict the statement that the error is larger.
     #[test]
     fn an_error_is_said_to_be_larger_only_where_it_is() {
         for ratio in [0.5, 0.872, 0.9999, 1.0, 1.0001, 1.2] {

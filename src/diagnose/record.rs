@@ -14,12 +14,12 @@ use super::records::EXCLUDED;
 #[derive(Debug, Clone, Copy, Default)]
 pub struct InitialState {
     pub motion: MotionState,
-    /// Displacement by a constant load that is not in the input.
+    /// Displacement under a constant load that is not in the input.
     pub preload: f64,
 }
 
 impl InitialState {
-    /// A stand on its way from there.
+    /// A stand starting from this state.
     pub fn run_of(self, chain: &Chain) -> StandRun<'_> {
         StandRun {
             chain,
@@ -29,23 +29,24 @@ impl InitialState {
     }
 }
 
-/// One record, or the part of it that is fitted or held out.
+/// A record, or the part of it that is fitted or held out.
 #[derive(Clone)]
 pub struct StandRecord {
-    /// File it comes from.
+    /// Source file.
     pub source: String,
     /// The applied quantity.
     pub input: Arc<Excitation>,
     /// The measured quantity, of the same length.
     pub measured: Arc<Vec<f64>>,
-    /// The samples that count.
+    /// The samples that are compared.
     pub range: Range<usize>,
     pub initial: InitialState,
-    /// Whether the applied quantity contains the measured one, by a spring that holds a free body.
+    /// Whether the applied quantity includes the measured one through a spring that ties a free
+    /// body.
     pub is_held: bool,
 }
 
-/// What a model adds to a record whose phase or size belongs to the record, not to the stand.
+/// Terms of a model whose phase or magnitude belongs to the record rather than the stand.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct NuisanceTerms {
     /// Frequencies of lines, such as mains pickup.
@@ -54,7 +55,7 @@ pub struct NuisanceTerms {
     pub drift_half_waves: usize,
     /// Rates at which a state from before the record decays, per s.
     pub decays_per_s: Vec<f64>,
-    /// Modes of the stand beside the plain stand's, which swing freely from the record's start.
+    /// Modes of the stand other than the plain stand's, with free motion from the record's start.
     pub modes: Vec<Mode>,
 }
 
@@ -66,7 +67,7 @@ impl NuisanceTerms {
         modes: Vec::new(),
     };
 
-    /// Those that stay as they are while parameters move.
+    /// The terms that do not depend on the fit parameters.
     pub fn lasting(self) -> Self {
         Self {
             drift_half_waves: self.drift_half_waves,
@@ -75,46 +76,48 @@ impl NuisanceTerms {
         }
     }
 
-    /// Whether something is added that the applied quantity does not cause.
+    /// Whether it includes disturbances not caused by the applied quantity.
     pub fn disturb(&self) -> bool {
         !self.lines_hz.is_empty() || self.drift_half_waves > 0
     }
 }
 
-/// Change of a record, over its range, with its own initial state.
+/// Derivatives of a record, over its range, with respect to its initial state.
 pub struct StateSlopes {
-    /// With the displacement, and with the speed over `ω₀`, at the first sample; none if the motion from there is gone.
+    /// With respect to displacement, and to speed over `ω₀`, at the first sample; `None` if the free motion has
+    /// decayed.
     pub motion: Option<[Vec<f64>; 2]>,
-    /// With the displacement by a constant load, where that is more than a constant.
+    /// With respect to the displacement under a constant load, if that is more than an offset.
     pub preload: Option<Vec<f64>>,
 }
 
-/// What belongs to a record and not to the stand: it is removed from the record's residual by least squares.
+/// Nuisance terms of a record, removed from its residual by least squares.
 #[derive(Clone, Default)]
 pub struct Nuisance {
     columns: Columns,
     /// Index of the first of the two columns of the free motion.
     motion: Option<usize>,
-    /// Whether enough of the free motion is left in the range to determine the motion at the first sample.
+    /// Whether enough of the free motion remains in the range to determine the initial state.
     sees_start: bool,
     /// Index of the column of a constant load.
     preload: Option<usize>,
-    /// Index of the first of the two columns of each further mode that swings freely, with its `ω₀`.
+    /// Index of the first of the two columns of each further free mode, with its `ω₀`.
     modes: Vec<(usize, f64)>,
     /// Index of the first column of the lines.
     lines: usize,
 }
 
-/// Fewest samples of a record's beginning: modes and what belongs to the record must not fit all of it.
+/// Minimum number of samples of a record's beginning, so that modes and nuisance terms cannot fit all
+/// of it.
 const SHORTEST: usize = 200;
-/// Time constants after which the free motion from a record's start is gone.
+/// Time constants after which the free motion from a record's start has decayed.
 pub const DECAYED: f64 = 12.0;
-/// Time constants up to which the range determines that motion: beyond, noise would be amplified by more than `e³` on its
-/// way back to the start.
+/// Time constants up to which the range determines the initial state: beyond, extrapolation to the start would amplify
+/// noise by more than `e³`.
 const START_SEEN: f64 = 3.0;
 
 impl StandRecord {
-    /// Samples of the range.
+    /// Number of samples in the range.
     pub fn count(&self) -> usize {
         self.range.len()
     }
@@ -123,7 +126,7 @@ impl StandRecord {
         self.input.rate_hz()
     }
 
-    /// Whether nothing acts: the stand rings freely.
+    /// Whether the applied quantity is zero: a free decay.
     pub fn is_free(&self) -> bool {
         self.input.samples().iter().all(|u| *u == 0.0)
     }
@@ -133,7 +136,7 @@ impl StandRecord {
         &self.input.samples()[self.range.clone()]
     }
 
-    /// What acts over the range, without a spring that holds a free body.
+    /// The applied quantity over the range, without the spring that ties a free body.
     pub fn acting_in_range(&self) -> Vec<f64> {
         let applied = self.applied_in_range();
         if !self.is_held {
@@ -148,7 +151,7 @@ impl StandRecord {
         &self.measured[self.range.clone()]
     }
 
-    /// A stand on its way through the record.
+    /// A stand run over the record.
     pub fn run_of<'a>(&self, chain: &'a Chain) -> StandRun<'a> {
         self.initial.run_of(chain)
     }
@@ -160,7 +163,7 @@ impl StandRecord {
         }
     }
 
-    /// A part of a record as a record of its own.
+    /// Part of a record as a separate record.
     pub fn part(&self, samples: Range<usize>) -> Self {
         let input = &self.input;
         let applied = input.samples()[samples.clone()].to_vec();
@@ -179,7 +182,7 @@ impl StandRecord {
         }
     }
 
-    /// The beginning of what counts, as a record of its own with the samples that its end needs.
+    /// The beginning of the range as a separate record, including the samples that its end needs.
     pub fn beginning(&self, part: f64) -> Self {
         let count = ((part * self.count() as f64) as usize).max(SHORTEST);
         let end = self.range.start + count.min(self.count());
@@ -190,29 +193,29 @@ impl StandRecord {
         }
     }
 
-    /// Whether free motion of a mode from before the range is left in it.
+    /// Whether free motion of a mode from before the range remains in it.
     pub fn has_free_motion(&self, mode: &Mode) -> bool {
         self.decay_to_range(mode) < DECAYED
     }
 
-    /// Whether enough of that motion is left to determine the state at the first sample.
+    /// Whether enough of that motion remains to determine the initial state.
     pub fn sees_start(&self, mode: &Mode) -> bool {
         self.decay_to_range(mode) < START_SEEN
     }
 
-    /// Time constants of a mode from the first sample to the range.
+    /// Time from the first sample to the range, in time constants of a mode.
     fn decay_to_range(&self, mode: &Mode) -> f64 {
         mode.damping_ratio * mode.omega_rad_s / self.rate_hz() * self.range.start as f64
     }
 
-    /// The motion of a mode over the range from a unit displacement at the first sample, and from a unit speed over `ω₀`.
+    /// Motion of a mode over the range from a unit initial displacement, and from a unit initial speed over `ω₀`.
     fn free_motion(&self, mode: &Mode) -> [Vec<f64>; 2] {
         let free = Chain::new(*mode, 1.0).free_motion(self.rate_hz(), self.range.end);
         free.map(|column| column[self.range.clone()].to_vec())
     }
 
-    /// What belongs to this record: a constant, the free motion of the plain stand after the record's start, and the
-    /// given terms. `slopes` replace that motion where the stand's effects change it.
+    /// Nuisance terms of this record: a constant, the free motion of the plain stand after the record's start, and
+    /// the given terms. `slopes` replace that motion where the stand's effects change it.
     pub fn nuisance(
         &self,
         mode: &Mode,
@@ -238,7 +241,7 @@ impl StandRecord {
         self.with_moved_terms(nuisance, terms)
     }
 
-    /// What belongs to this record beside its motion: a constant and the given terms.
+    /// Nuisance terms of this record except the motion: a constant and the given terms.
     pub fn nuisance_beside_motion(&self, terms: &NuisanceTerms) -> Nuisance {
         let mut nuisance = Nuisance::default();
         nuisance.columns.push(vec![1.0; self.count()]);
@@ -246,7 +249,7 @@ impl StandRecord {
         self.with_moved_terms(nuisance, terms)
     }
 
-    /// The terms that stay as they are while parameters move.
+    /// Adds the terms that do not depend on the fit parameters.
     fn with_lasting_terms(&self, nuisance: &mut Nuisance, terms: &NuisanceTerms) {
         let columns = &mut nuisance.columns;
         let count = self.count();
@@ -264,7 +267,7 @@ impl StandRecord {
         nuisance.lines = columns.count();
     }
 
-    /// What belongs to this record, and the terms that parameters move.
+    /// Adds the terms that depend on the fit parameters.
     pub fn with_moved_terms(&self, mut nuisance: Nuisance, terms: &NuisanceTerms) -> Nuisance {
         let columns = &mut nuisance.columns;
         let (rate_hz, count) = (self.rate_hz(), self.count());
@@ -288,11 +291,11 @@ impl StandRecord {
 #[derive(Debug, Clone, Default)]
 pub struct NuisanceFit {
     pub offset: f64,
-    /// Displacement, and speed over `ω₀`, at the start of the record, where the range determines them.
+    /// Initial displacement, and speed over `ω₀`, of the record, where the range determines them.
     pub motion: Option<[f64; 2]>,
-    /// Displacement and speed there of further modes.
+    /// Initial displacement and speed of further modes.
     pub of_modes: MotionState,
-    /// Displacement by the constant load.
+    /// Displacement under the constant load.
     pub preload: Option<f64>,
     /// Cosine and sine part of each line.
     pub lines: Vec<[f64; 2]>,

@@ -1,4 +1,4 @@
-//! A model that is run on records, and the state at their start that leaves least of them.
+//! A model run on records, and the optimum initial states.
 
 use std::f64::consts::PI;
 
@@ -13,18 +13,18 @@ use super::record::{InitialState, NuisanceTerms, StandRecord, StateSlopes};
 use super::structure::Structure;
 use super::unexplained::{raw_residual, raw_residuals};
 
-/// Step of the initial state for differences, over the rms of the record.
+/// Finite-difference step of the initial state, relative to the RMS of the record.
 const STATE_STEP: f64 = 1e-4;
-/// Fewest samples that show a state.
+/// Minimum number of samples that determine a state.
 const FEWEST: usize = 6;
-/// Parts of a step to a better initial state that are tried.
+/// Fractions tried of a step to a better initial state.
 const STEPS: [f64; 3] = [1.0, 0.3, 0.1];
 
-/// A model that is run on records, each with its own initial state.
+/// A model run on records, each with its own initial state.
 pub(super) struct RecordModel {
     pub chain: Chain,
     pub terms: NuisanceTerms,
-    /// The mode of the free motion from a record's start.
+    /// Mode of the free motion from a record's start.
     free: Mode,
     /// Rms of the training records.
     rms: f64,
@@ -41,8 +41,8 @@ impl RecordModel {
         }
     }
 
-    /// The raw residual of a record, and how the record changes with its own initial state, by differences; `None` if the motion
-    /// diverges.
+    /// The raw residual of a record, and its finite-difference derivatives with respect to the initial state; `None` if
+    /// the motion diverges.
     pub fn residual_and_slopes(&self, record: &StandRecord) -> Option<(Vec<f64>, StateSlopes)> {
         let step = STATE_STEP * self.rms;
         let moves = record.has_free_motion(&self.free);
@@ -79,7 +79,7 @@ impl RecordModel {
         Some((residual, StateSlopes { motion, preload }))
     }
 
-    /// The residual of a record with the initial state that it has; `None` if the motion diverges.
+    /// The residual of a record with its present initial state; `None` if the motion diverges.
     fn residual(&self, record: StandRecord) -> Option<RecordResidual> {
         let (mut samples, slopes) = match self.chain.is_integrated() {
             true => {
@@ -91,7 +91,7 @@ impl RecordModel {
         let raw = samples.clone();
         let nuisance = record.nuisance(&self.free, &self.terms, slopes);
         let nuisance = nuisance.fit(&mut samples);
-        // Of a stand that rings freely, all motion follows from its state.
+        // For a free decay, all motion follows from the initial state.
         let left = if record.is_free() { &samples } else { &raw };
         let pairs = record.measured_in_range().iter().zip(left);
         let modelled = pairs.map(|(y, r)| y - r).collect();
@@ -103,9 +103,9 @@ impl RecordModel {
         })
     }
 
-    /// The residual of a record with the initial state that leaves least of it. A motion that is integrated depends on it in a
-    /// curved way: the search begins with the state that the record has, at rest, and with what free ringing shows of it, and goes on
-    /// by Gauss's and Newton's steps as long as they help. `None` if the motion diverges.
+    /// The residual of a record with the optimum initial state. An integrated motion depends on it nonlinearly: the
+    /// search starts from the record's own state, from rest, and from the one estimated from a free decay, and
+    /// continues with Gauss–Newton steps while they help. `None` if the motion diverges.
     pub fn settled(&self, record: &StandRecord) -> Option<RecordResidual> {
         if !self.chain.is_integrated() {
             return self.residual(record.clone());
@@ -132,8 +132,8 @@ impl RecordModel {
         Some(found)
     }
 
-    /// The state at the first sample that the first half period of free ringing shows: that of a swing about any middle, on the
-    /// side of the record's mean on which it is.
+    /// Initial state estimated from the first half period of a free decay: an oscillation about any centre, on the side
+    /// of the record's mean on which it lies.
     fn shown_at_start(&self, record: &StandRecord) -> Option<InitialState> {
         let measured = record.measured_in_range();
         let turn = self.free.omega_rad_s / record.rate_hz();
@@ -153,7 +153,7 @@ impl RecordModel {
         })
     }
 
-    /// A record with part of the correction of its initial state that its residual shows.
+    /// A record with part of the correction of its initial state suggested by its residual.
     fn stepped(&self, found: &RecordResidual, part: f64) -> StandRecord {
         let mut record = found.record.clone();
         let motion = found.nuisance.motion.unwrap_or_default();

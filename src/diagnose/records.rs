@@ -10,24 +10,23 @@ use super::structure::FitContext;
 
 #[derive(Clone)]
 pub struct Records {
-    /// Models are fitted to these and chosen by them.
+    /// Records for fitting and model selection.
     pub train: Vec<StandRecord>,
-    /// The errors that are reported are taken on these. None while something is chosen.
+    /// Records for the reported errors. Empty during model selection.
     pub holdout: Vec<StandRecord>,
 }
 
-/// Samples at both ends that are always excluded: there the extrapolation beyond the record matters most.
+/// Samples always excluded at both ends, where the extrapolation beyond the record matters most.
 pub const EXCLUDED: usize = 32;
-/// Part of a record that is excluded at its start, and at its end: a second mode, a filter or a joint decays more slowly
-/// than the stand, and a complex stiffness responds before its cause.
+/// Fractions of a record excluded at its start and end: a second mode, a filter or a joint decays more slowly than the
+/// stand, and a complex stiffness is non-causal.
 const EXCLUDED_PARTS: [f64; 2] = [0.04, 0.01];
-/// Time constants of the stand that are excluded at the start: the state of recorder and joints from before the record has
-/// decayed by then.
+/// Time constants of the stand excluded at the start: the initial state of recorder and joints has then decayed.
 const SETTLING: f64 = 3.0;
-/// Largest part of a record that is excluded.
+/// Largest excluded fraction of a record.
 const MOST_EXCLUDED: f64 = 0.1;
 
-/// Part of a training record that is fitted if the rest is held out.
+/// Fraction of a training record that is fitted if the rest is held out.
 const FITTED: f64 = 0.7;
 
 /// Whether an input consists of plateaus.
@@ -48,7 +47,7 @@ impl Records {
         }
     }
 
-    /// The training records alone: while something is chosen, nothing is held out.
+    /// The training records alone; nothing is held out during model selection.
     pub fn training(&self) -> Self {
         Self {
             train: self.train.clone(),
@@ -56,7 +55,7 @@ impl Records {
         }
     }
 
-    /// Whether nothing acts in any of them.
+    /// Whether all of them are free decays.
     pub fn are_free(&self) -> bool {
         self.train
             .iter()
@@ -72,7 +71,7 @@ impl Records {
         self.train[0].rate_hz()
     }
 
-    /// Steps of integration from sample to sample.
+    /// Integration steps per sample.
     pub fn substeps(&self) -> usize {
         self.train[0].input.substeps()
     }
@@ -81,8 +80,8 @@ impl Records {
         self.change_inputs(|input| input.with_substeps(substeps));
     }
 
-    /// The same records with another course of the input between its samples. Beside training records of other inputs, plateaus
-    /// are held in any case; beside held plateaus alone, other inputs are of limited band.
+    /// The same records with another waveform of the input between its samples. If other training inputs are present,
+    /// plateau inputs remain held; with held plateau inputs only, other inputs are band-limited.
     pub fn with_between(&self, between: Between) -> Self {
         let only_plateaus = from_inputs(&self.train) == Between::Held;
         let mut other = self.clone();
@@ -97,14 +96,15 @@ impl Records {
         other
     }
 
-    /// Course of the input between its samples; of plateaus only where no training record has another input.
+    /// Waveform of the input between its samples; that of plateau inputs only if no training record has
+    /// another input.
     pub fn between(&self) -> Between {
         let is_other = |r: &&StandRecord| !r.is_free() && !has_plateaus(&r.input);
         let other = self.train.iter().find(is_other);
         other.unwrap_or(&self.train[0]).input.between()
     }
 
-    /// Changes applied and measured quantity; records that share them go on sharing them.
+    /// Changes applied and measured quantities; shared ones remain shared.
     pub fn change_records(&mut self, change: impl Fn(&StandRecord) -> StandRecord) {
         let mut made: Vec<(Arc<Excitation>, StandRecord)> = Vec::new();
         for record in self.all() {
@@ -123,7 +123,7 @@ impl Records {
         }
     }
 
-    /// Changes the inputs; records that share an input go on sharing it.
+    /// Changes the inputs; shared ones remain shared.
     fn change_inputs(&mut self, change: impl Fn(&Excitation) -> Excitation) {
         let mut made: Vec<(Arc<Excitation>, Arc<Excitation>)> = Vec::new();
         for record in self.all() {
@@ -140,12 +140,12 @@ impl Records {
         }
     }
 
-    /// Sets the steps of integration and the samples that count for the plain stand of a context.
+    /// Sets the integration steps and the compared samples for the plain stand of a context.
     pub fn prepare_for(&mut self, context: &FitContext) {
         let rate_hz = self.rate_hz();
         let mode = context.plain.mode();
         let decay = mode.damping_ratio * mode.omega_rad_s / rate_hz;
-        // Of a decay all counts: its state is estimated, and nothing acts beyond it.
+        // All of a free decay is used: its initial state is estimated, and nothing acts beyond it.
         for record in self.all().filter(|record| !record.is_free()) {
             let count = record.measured.len();
             let most = (MOST_EXCLUDED * count as f64) as usize;

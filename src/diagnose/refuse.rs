@@ -1,4 +1,4 @@
-//! Records that cannot be diagnosed.
+//! Rejection of records that cannot be diagnosed.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -18,26 +18,26 @@ use torqcomp_dsp::dot;
 
 /// Minimum number of periods of the natural frequency in the longest training record.
 const FEWEST_PERIODS: f64 = 10.0;
-/// Relative error of the plain stand from which on the channels are tried the other way round.
+/// Relative error of the plain stand above which the channels are also tried swapped.
 pub const LARGE_ERROR: f64 = 0.3;
-/// Error the other way round, over that as given, below which the channels count as swapped.
+/// Ratio of the error with swapped channels to that as given, below which they count as swapped.
 const SWAPPED: f64 = 0.5;
-/// Error with the gain left free, over that with the declared one, below which the declared one belongs to another unit.
+/// Ratio of the error with a free gain to that with the declared one, below which the declared one has the wrong unit.
 const ANOTHER_UNIT: f64 = 0.5;
-/// Ratios of the gain to the declared one that the effect `gain-error` describes.
+/// Ratios of the gain to the declared one that the effect `gain-error` covers.
 const GAIN_ERRORS: Range<f64> = 0.1..11.0;
-/// Error of a plain stand fitted to the held-out records alone, over that of the one from training, below which the records
-/// may be of two stands.
+/// Ratio of the error of a plain stand fitted to the held-out records alone to that of the one from training, below
+/// which the records may be of two stands.
 const APART: f64 = 0.5;
 
-/// Refuses records that have the wrong sign or unit, have their channels swapped or shifted, or are too short; the shift of the
-/// channels that remains to be weighed against effects.
+/// Rejects records that have the wrong sign or unit, have their channels swapped or shifted, or are too short; returns
+/// the remaining shift of the channels, to be weighed against effects.
 ///
 /// # Errors
-/// If they are.
+/// If the records are rejected.
 pub fn check(case: &Case, context: &FitContext) -> Result<Option<Alignment>, Failure> {
     if case.records.are_free() {
-        // There is no other channel.
+        // A free decay has no other channel.
         return refuse_short(case, context).map(|()| None);
     }
     let as_given = relative_error(context, &case.records.train);
@@ -45,7 +45,7 @@ pub fn check(case: &Case, context: &FitContext) -> Result<Option<Alignment>, Fai
         .then(|| Alignment::find(case, context, as_given))
         .flatten();
     if as_given >= LARGE_ERROR {
-        // Half a period late is nearly upside down: the sign is the simpler of the two.
+        // A delay of half a period is close to an inversion; the sign is the simpler explanation.
         let shifted = alignment.as_ref().map(|a| a.errors[1]);
         refuse_sign_or_unit(case, context, shifted.unwrap_or(as_given).min(as_given))?;
     }
@@ -56,7 +56,7 @@ pub fn check(case: &Case, context: &FitContext) -> Result<Option<Alignment>, Fai
         .as_ref()
         .is_some_and(|a| a.errors[1] < ANOTHER_UNIT * as_given);
     if as_given >= LARGE_ERROR && !is_shifted {
-        // Swapped channels fit any frequency, which may make them look too short.
+        // Swapped channels fit any frequency, so the record may seem too short.
         refuse_swapped(case, context, as_given)?;
     }
     refuse_short(case, context)?;
@@ -95,7 +95,7 @@ pub fn longest(train: &[StandRecord]) -> Option<(&StandRecord, f64)> {
     Some((longest, longest.count() as f64 / longest.rate_hz()))
 }
 
-/// Refuses a measured channel that a declared gain turns upside down or makes many times too large or too small.
+/// Rejects a measured channel whose sign or magnitude contradicts the declared gain.
 fn refuse_sign_or_unit(case: &Case, context: &FitContext, as_given: f64) -> Result<(), Failure> {
     if context.gain_is_free {
         return Ok(());
@@ -187,7 +187,7 @@ fn swap(record: &StandRecord) -> StandRecord {
     }
 }
 
-/// Rms error of the plain stand of a context on records, over their rms.
+/// RMS error of the plain stand of a context on records, relative to their RMS.
 pub fn relative_error(context: &FitContext, records: &[StandRecord]) -> f64 {
     let plain = context.plain;
     let structure = Structure::plain(Arc::new(context.clone()));
@@ -207,7 +207,7 @@ pub fn relative_error(context: &FitContext, records: &[StandRecord]) -> f64 {
     (error / whole).sqrt()
 }
 
-/// The plain stands fitted to training and to held-out records alone, where no common one fits both but each has its
+/// The plain stands fitted to training and to held-out records alone, if no common one fits both but each has its
 /// own.
 pub fn plain_stands_apart(before: &ScoredModel) -> Option<[PlainStand; 2]> {
     let train = before.fitted.stand();

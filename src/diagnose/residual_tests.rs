@@ -10,24 +10,24 @@ use super::spectra::coherent_share;
 use super::stationarity;
 use torqcomp_dsp::dot;
 
-/// Lags of the tests of whiteness and of independence from the input.
+/// Number of lags of the tests for whiteness and independence of the input.
 const LAGS: usize = 25;
 /// Confidence level of these tests.
 const CONFIDENCE: f64 = 0.99;
-/// Lags over which the colour of residual and input counts, and their largest part of a record.
+/// Number of lags over which autocorrelations count, and their largest fraction of a record.
 const COLOUR_LAGS: usize = 400;
 const COLOUR_PART: usize = 4;
-/// Share of a residual's power in its largest hundredth of samples above which it has spikes: 8 % of that of normal noise is
-/// there, 16 % of that of double-exponential noise.
+/// Share of a residual's power in the largest 1 % of its samples above which it has spikes: 8 % for normal, 16 % for
+/// double-exponential noise.
 const SPIKES: f64 = 0.2;
-/// Share of a residual's power, and standard deviations from zero, above which it depends on something.
+/// Minimum share of a residual's power, and standard deviations from zero, for a dependence.
 const DEPENDENT: [f64; 2] = [0.04, 4.0];
-/// Share of a residual's power above which the constants change, the zero drifts, or the noise follows the signal or its
-/// slope: right models leave at most 0.008, 0.002 and 0.03 of the blind records.
+/// Shares of a residual's power above which the constants change, the zero drifts, or the noise follows the signal or
+/// its slope: correct models leave at most 0.008, 0.002 and 0.03 of the blind records.
 const CHANGING: f64 = 0.04;
 const DRIFTING: f64 = 0.03;
 const FOLLOWING: f64 = 0.08;
-/// Standard deviations from zero for that.
+/// Standard deviations from zero required for that.
 const NONSTATIONARY: f64 = 6.0;
 
 /// A share of the residual's power that follows from something.
@@ -85,13 +85,13 @@ impl ResidualTests {
         }
     }
 
-    /// The largest significant share that follows from the input or the motion.
+    /// The largest significant share that depends on the input or the motion.
     pub fn dependence(&self) -> Option<&PowerShare> {
         let shares = self.shares.iter().filter(|s| s.exceeds(DEPENDENT));
         shares.max_by(|a, b| a.share.total_cmp(&b.share))
     }
 
-    /// Whether any test sees a dependence on input, motion or time.
+    /// Whether any test detects a dependence on input, motion or time.
     pub fn follows_anything(&self) -> bool {
         let is_seen = self.dependence().is_some() || self.nonstationary().is_some();
         is_seen || self.has_spikes() || !self.independent_of_input
@@ -102,9 +102,10 @@ impl ResidualTests {
         self.in_largest_hundredth > SPIKES
     }
 
-    /// Whether stand, measuring chain or noise change over the record; differences between periods show that as noise.
+    /// Whether stand, measuring chain or noise change over the record; differences between periods count such changes
+    /// as noise.
     pub fn nonstationary(&self) -> Option<&PowerShare> {
-        // The specific ones first: changing constants also leave a residual that follows the signal.
+        // The specific ones first: changing constants also give a residual that follows the signal.
         let least = [CHANGING, DRIFTING, FOLLOWING, FOLLOWING];
         let [changing, signal, slope, zero] = self.stationarity();
         let mut both = [changing, zero, signal, slope].into_iter().zip(least);
@@ -117,7 +118,7 @@ impl ResidualTests {
         self.wandering_zero.exceeds([DRIFTING, NONSTATIONARY])
     }
 
-    /// The shares of what changes over the record.
+    /// The shares of changes over the record.
     pub fn stationarity(&self) -> [&PowerShare; 4] {
         [
             &self.changing_constants,
@@ -149,7 +150,7 @@ fn autocorrelation(values: &[f64], lags: usize) -> Vec<f64> {
     (0..=lags.min(values.len() - 1)).map(sum).collect()
 }
 
-/// Sums of products at lags from 0, of several residuals together.
+/// Sums of products at lags from 0, over several residuals.
 pub fn autocorrelations<'a>(
     residuals: impl Iterator<Item = &'a RecordResidual>,
     lags: usize,
@@ -178,7 +179,7 @@ fn whiteness(residuals: &[RecordResidual]) -> (bool, Option<f64>) {
     (q <= bound, Some(q / bound))
 }
 
-/// Largest cross-correlation with the input against its bound, with the colour of both taken into account
+/// Largest cross-correlation with the input against its bound, allowing for the autocorrelation of both
 /// (M. S. Bartlett, J. R. Stat. Soc. Suppl. 8 (1946), 27).
 fn input_independence(residuals: &[RecordResidual]) -> (bool, i64) {
     let mut variance = 0.0;
@@ -190,7 +191,7 @@ fn input_independence(residuals: &[RecordResidual]) -> (bool, i64) {
         let (rr, uu) = (autocorrelation(r, reach), autocorrelation(&u, reach));
         let white = rr[0] * uu[0];
         let colour = white + 2.0 * dot(&rr[1..], &uu[1..]);
-        // The products of different records are independent: their variances add.
+        // The products of different records are independent, so their variances add.
         variance += colour.max(white * 1e-6) / r.len() as f64;
         for (k, sum) in cross.iter_mut().enumerate() {
             *sum += match k.checked_sub(LAGS) {
@@ -208,7 +209,7 @@ fn input_independence(residuals: &[RecordResidual]) -> (bool, i64) {
     (within || variance == 0.0, largest as i64 - LAGS as i64)
 }
 
-/// A function of the motion that a residual may follow from, of displacement and speed in units of their rms.
+/// A function of the motion that may explain a residual, of displacement and speed in units of their RMS.
 type MotionFunction = (&'static str, fn(f64, f64) -> f64);
 
 const MOTION_FUNCTIONS: [MotionFunction; 6] = [
@@ -220,7 +221,7 @@ const MOTION_FUNCTIONS: [MotionFunction; 6] = [
     ("the square of the speed", |_, v| v * v.abs()),
 ];
 
-/// What the share that follows linearly from the input is called.
+/// Name of the share linear in the input.
 pub const FROM_INPUT: &str = "the input";
 
 fn shares(residuals: &[RecordResidual], mode: &Mode) -> Vec<PowerShare> {
@@ -247,7 +248,7 @@ pub fn without_mean(values: &[f64]) -> Vec<f64> {
     values.iter().map(|x| x - mean).collect()
 }
 
-/// Difference of both neighbours; of one neighbour and the sample itself at the ends.
+/// Central differences; one-sided at the ends.
 pub fn differences(x: &[f64]) -> Vec<f64> {
     let last = x.len().saturating_sub(1);
     let difference = |i: usize| x[(i + 1).min(last)] - x[i.saturating_sub(1)];
@@ -259,7 +260,7 @@ fn over_rms(values: &[f64]) -> Vec<f64> {
     values.iter().map(|x| x / rms.max(1e-300)).collect()
 }
 
-/// The share over all records, each weighted with its residual's power.
+/// Pooled share of all records, each weighted with its residual's power.
 fn pooled_share(
     of: &'static str,
     residuals: &[RecordResidual],
@@ -293,7 +294,8 @@ mod tests {
     use super::*;
     use crate::diagnose::test_noise::noise;
 
-    /// Of 400 sets of records whose residual is noise, 1 % are found to depend on the input: 4, and hardly ever more than 11.
+    /// Of 400 sets of records whose residual is noise, 1 % appear to depend on the input: 4, and hardly ever more than
+    /// 11.
     #[test]
     fn noise_depends_on_the_input_as_often_as_the_level_says() {
         let mut random = noise(1);

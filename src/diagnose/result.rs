@@ -1,4 +1,4 @@
-//! The result of a diagnosis: its JSON document, from which text and page are written as well.
+//! The result of a diagnosis: its JSON document, the basis of text and HTML reports.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -206,14 +206,14 @@ impl Diagnosis {
         }
     }
 
-    /// What all its models share.
+    /// The context shared by all models.
     pub fn context(&self) -> &FitContext {
         &self.after.fitted.structure.context
     }
 }
 
 impl SearchState {
-    /// All candidates in the order in which they are reported.
+    /// All candidates in the order of the report.
     fn candidates(&mut self) -> Vec<CandidateFit> {
         let mut all = Vec::new();
         for mut round in std::mem::take(&mut self.rounds) {
@@ -252,7 +252,7 @@ impl ErrorTable {
     }
 }
 
-/// Rms of the held-out records about their means, nuisance terms removed.
+/// RMS of the held-out records about their means, without nuisance terms.
 fn holdout_rms(before: &ScoredModel) -> f64 {
     let (mut sum, mut count) = (0.0, 0_usize);
     for residual in before.compared.iter() {

@@ -1,5 +1,5 @@
-//! Models with their errors on the records on which they are compared: the training records while something is chosen, the
-//! held-out ones in the report.
+//! Models with their errors on the records used for comparison: the training records during selection, the held-out
+//! ones in the report.
 
 use std::sync::Arc;
 
@@ -23,9 +23,9 @@ pub struct ScoredModel {
     pub fitted: FittedModel,
     /// Residuals on the training records.
     pub train: Arc<[RecordResidual]>,
-    /// Residuals on the records on which models are compared: these, or the held-out ones if the records have any.
+    /// Residuals on the records used for comparison: the training records, or the held-out ones if there are any.
     pub compared: Arc<[RecordResidual]>,
-    /// Rms of what the uncertainty of the constants leaves on these; zero while something is chosen.
+    /// RMS uncertainty of these due to the constants; zero during selection.
     pub uncertain_rms: f64,
 }
 
@@ -50,14 +50,14 @@ pub struct RmsErrors {
     pub holdout_rms: f64,
 }
 
-/// Standard uncertainties from zero from which on a parameter differs from zero.
+/// Minimum distance of a parameter from zero, in standard uncertainties.
 const SIGNIFICANT: f64 = 3.0;
-/// A repeated fit with a finer step of integration or another course of the input.
+/// A refit with a finer integration step or another waveform of the input.
 const REPEATED_FIT: FitEffort = FitEffort::full(6);
-/// Change of a record with half the step of integration, over the rms of the residual, above which the step is halved.
+/// Change of a record with half the integration step, relative to the RMS residual, above which the step is halved.
 const STEP_ERROR: f64 = 0.1;
-/// Most steps of integration, over those of the stand without effects: a listed effect needs one to four of them, a law that
-/// imitates something else (a hard stop, say) does not converge.
+/// Maximum refinement of the step relative to the stand without effects: a listed effect needs one to four times as
+/// many steps, while a law that imitates another (a hard stop, say) does not converge.
 const FINEST: usize = 8;
 
 impl ScoredModel {
@@ -78,10 +78,10 @@ impl ScoredModel {
         }
     }
 
-    /// The same model with its residuals on the held-out records; `None` if the motion diverges on one of them.
+    /// The model with its residuals on the held-out records; `None` if the motion diverges on one of them.
     pub fn compared_on_holdout(mut self, records: &Records) -> Option<Self> {
         let residuals = records.holdout.iter().map(|record| {
-            // A part of a training record starts where that record starts.
+            // A part of a training record has the initial state of that record.
             let mut whole = records.train.iter();
             match whole.position(|t| Arc::ptr_eq(&t.input, &record.input)) {
                 Some(k) => {
@@ -95,14 +95,14 @@ impl ScoredModel {
         Some(self)
     }
 
-    /// The same model fitted again, with the step and the course of the input that the records have now.
+    /// Refits the model with the current step and waveform of the records.
     pub fn again(&self, records: &Records) -> Option<Self> {
         let fitted = self.fitted.refit(&records.train, REPEATED_FIT).ok()?;
         Self::of(fitted, records)
     }
 
-    /// Halves the step of integration and fits again until the error of the integration no longer matters; whether that
-    /// was reached. `coarse` is the number of steps for the stand without effects.
+    /// Halves the integration step and refits until the integration error is negligible; returns whether that was
+    /// reached. `coarse` is the number of steps for the stand without effects.
     pub fn refine_step(mut self, records: &mut Records, coarse: usize) -> (Self, bool) {
         while self.fitted.integrates() {
             let Some(change) = self.fitted.step_change(&records.train[0]) else {
@@ -141,7 +141,7 @@ impl ScoredModel {
         }
     }
 
-    /// Mean square of the compared residuals above that of the noise.
+    /// Mean square of the compared residuals above the noise.
     pub fn excess_power(&self, noise_rms: f64) -> f64 {
         self.compared_rms().powi(2) - noise_rms.powi(2)
     }
@@ -152,7 +152,7 @@ impl ScoredModel {
         all.collect::<Vec<_>>().concat()
     }
 
-    /// Number of parameters, amplitudes of lines included, and their phases on each training record.
+    /// Number of parameters, including amplitudes of lines and their phases on each training record.
     pub fn parameter_count(&self) -> usize {
         let (_, terms) = self.fitted.structure.model(&self.fitted.values);
         self.fitted.values.len()
@@ -182,27 +182,27 @@ impl ScoredModel {
         compare(&before.compared_samples(), &self.compared_samples())
     }
 
-    /// Bayesian information criterion on the training records, less a constant: smaller is better
+    /// Bayesian information criterion on the training records, up to a constant; smaller is better
     /// (G. Schwarz, Ann. Stat. 6 (1978), 461).
     pub fn criterion(&self) -> f64 {
         let n = self.train.iter().map(|r| r.samples.len()).sum::<usize>() as f64;
         2.0 * n * self.train_rms().ln() + self.parameter_count() as f64 * n.ln()
     }
 
-    /// Names of the effects that were added to those of the stand file.
+    /// Names of the effects added to those of the stand file.
     pub fn effect_names(&self) -> Vec<&'static str> {
         let effects = self.fitted.structure.added().iter();
         effects.map(|e| e.effect.name).collect()
     }
 
-    /// Natural frequency in Hz, damping ratio and static gain of the plain stand in the model.
+    /// Natural frequency in Hz, damping ratio and static gain of the model's plain stand.
     pub fn constants(&self) -> [Estimate; 3] {
         let fitted = &self.fitted;
         let plain = fitted.stand();
         let values = [plain.natural_hz, plain.damping_ratio, plain.gain];
         let count = fitted.structure.context.constant_count();
         std::array::from_fn(|k| {
-            // The fit moves multiples of the constants.
+            // The fit parameters are multiples of the constants.
             let moved = fitted.values[..count].get(k).zip(fitted.std.get(k));
             let std = moved.and_then(|(v, std)| std.map(|std| std * (values[k] / v).abs()));
             Estimate::of(["Hz", "", ""][k], values[k], std)
@@ -254,7 +254,7 @@ fn rms(residuals: &[RecordResidual]) -> f64 {
 }
 
 impl FittedModel {
-    /// Rms by which a training record changes with half the step of integration.
+    /// RMS change of a training record with half the integration step.
     pub fn step_change(&self, first: &StandRecord) -> Option<f64> {
         let (model, _) = self.structure.model(&self.values);
         let mut record = first.starting_from(*self.initial.first()?);
@@ -266,16 +266,16 @@ impl FittedModel {
     }
 }
 
-/// A model to which effects are added, with the slopes of its residuals.
+/// A model to which effects are added, with the derivatives of its residuals.
 pub struct BaseModel {
     pub scored: ScoredModel,
     /// For each training record, the derivatives of the residual with respect to the parameters.
     pub slopes: Vec<Columns>,
-    /// For each training record, what belongs to it.
+    /// Nuisance terms of each training record.
     pub nuisance: Vec<Nuisance>,
 }
 
-/// Relative step of the differences.
+/// Relative finite-difference step.
 const STEP: f64 = 1e-6;
 
 impl BaseModel {
@@ -290,8 +290,8 @@ impl BaseModel {
         }
     }
 
-    /// Something of each training record, by its number, without what the base's own parameters and what belongs to the
-    /// record can change of it; one record after the other.
+    /// A series per training record, by its index, without what the base's own parameters and nuisance terms can
+    /// absorb; one record after the other.
     pub fn cleared(&self, of: impl Fn(usize) -> Vec<f64>) -> Vec<f64> {
         let clear = |(k, slopes): (usize, &Columns)| {
             let mut samples = of(k);
@@ -303,7 +303,8 @@ impl BaseModel {
     }
 }
 
-/// Derivatives of a record's residual with respect to the parameters, and the nuisance terms removed from it.
+/// Derivatives of a record's residual with respect to the parameters, without its nuisance terms, and these
+/// terms.
 fn slopes(fitted: &FittedModel, record: &StandRecord) -> (Columns, Nuisance) {
     let terms = fitted.structure.context.terms();
     let (derivatives, nuisance) = derivatives(fitted, record, &terms);
@@ -319,8 +320,8 @@ fn slopes(fitted: &FittedModel, record: &StandRecord) -> (Columns, Nuisance) {
     (slopes, nuisance)
 }
 
-/// The derivative of a record's residual with respect to each parameter, nuisance terms removed; `None` if the motion
-/// diverges. And these terms.
+/// Derivative of a record's residual with respect to each parameter, without nuisance terms, and these terms; `None`
+/// if the motion diverges.
 pub fn derivatives(
     fitted: &FittedModel,
     record: &StandRecord,

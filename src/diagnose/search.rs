@@ -53,7 +53,7 @@ pub fn name_of<S: Serializer>(effect: &&'static Effect, serializer: S) -> Result
     serializer.serialize_str(effect.name)
 }
 
-/// How the search is run: threads, and who is told of the fits done and of all.
+/// Threads of the search, and progress reporting.
 #[derive(Clone, Copy)]
 pub struct Workers<'p> {
     pub threads: usize,
@@ -61,7 +61,7 @@ pub struct Workers<'p> {
 }
 
 impl Workers<'_> {
-    /// The same, and nobody is told.
+    /// The same without progress reporting.
     pub fn silent(self) -> Workers<'static> {
         Workers {
             progress: &|_, _| {},
@@ -74,18 +74,19 @@ impl Workers<'_> {
 const LEAST_GAIN: f64 = 40.0;
 /// Minimum relative reduction of the sum of squares.
 const LEAST_SHARE: f64 = 0.005;
-/// Minimum significance of the reduction over the blocks of the records; times the root of the number of effects that
-/// reduce it together, as they fit more of the noise.
+/// Minimum significance of the reduction over the blocks of the records; times the square root of the number of
+/// effects that cause it together, as they fit more of the noise.
 const LEAST_SIGNIFICANCE: f64 = 3.0;
-/// Parameters of an effect up to which that holds; where noise rings, those with more find more of it.
+/// Number of parameters of an effect up to which that holds; in correlated noise, those with more fit
+/// more of it.
 const FEW_PARAMETERS: f64 = 3.0;
-/// Standard deviations that a normal quantity exceeds in 95 % of all cases.
+/// One-sided 95 % quantile of the normal distribution.
 const CERTAIN: f64 = 1.645;
-/// Difference of the criterion that counts as none.
+/// Difference of the criterion that counts as a tie.
 pub const SAME: f64 = 4.0;
-/// Lines of the residual's spectrum that may be that of a shaft.
+/// Number of lines of the residual's spectrum that may be from a shaft.
 const LINES: usize = 3;
-/// Minimum power of such a line over the spectrum around it.
+/// Minimum power of such a line relative to its surroundings.
 const PROMINENT: f64 = 12.0;
 /// Reduction of the training sum of squares, in residual variances, below which a fit is not continued.
 const WORTHWHILE: f64 = 5.0;
@@ -93,21 +94,21 @@ const WORTHWHILE: f64 = 5.0;
 const FIRST_FIT: FitEffort = FitEffort::brief(3);
 const SECOND_FIT: FitEffort = FitEffort::brief(5);
 const FULL_FIT: FitEffort = FitEffort::full(15);
-/// Most full fits in a row, and the sum of squares of one over that of the one before from which on no further one follows.
+/// Maximum number of successive full fits, and ratio of successive sums of squares above which they end.
 const MOST_FULL_FITS: usize = 4;
 const FALLING: f64 = 0.9;
-/// Parts of the records that first fits of a stand with several modes begin with.
+/// Initial fractions of the records for the first fits of a stand with several modes.
 const BEGINNINGS: [f64; 3] = [0.03, 0.1, 0.3];
 
-/// How many forms go on from one stage of fitting to the next.
+/// Number of forms that advance between the stages of fitting.
 pub struct SearchEffort {
-    /// Forms that get a first fit, by the residual that their starts leave.
+    /// Number of forms that get a first fit, ranked by the residual of their starts.
     pub first: usize,
-    /// Gain of the first fit, over the largest of all, from which on a second one follows.
+    /// Minimum gain of the first fit, relative to the largest, for a second one.
     pub second: f64,
-    /// Forms that get a full fit, ties aside.
+    /// Number of forms that get a full fit, excluding ties.
     pub full: usize,
-    /// Gain of the second fit, over the largest of all, from which on such a fit follows.
+    /// Minimum gain of the second fit, relative to the largest, for a full one.
     pub promising: f64,
 }
 
@@ -117,7 +118,8 @@ pub const FOR_FIRST_EFFECT: SearchEffort = SearchEffort {
     full: 12,
     promising: 0.5,
 };
-/// Beside an accepted effect, what a first fit gains says less about the last one: all parameters must move together.
+/// With an accepted effect, the gain of a first fit predicts that of the last one less well: all parameters must move
+/// together.
 const FOR_SECOND_EFFECT: SearchEffort = SearchEffort {
     first: usize::MAX,
     second: 0.02,
@@ -125,9 +127,9 @@ const FOR_SECOND_EFFECT: SearchEffort = SearchEffort {
     promising: 0.1,
 };
 
-/// Every effect added to a base model in turn.
+/// One round of adding each effect to a base model.
 pub struct Round {
-    /// One for each effect, in its best form; if one of them is accepted, it is the first.
+    /// One candidate per effect, in its best form; an accepted one is first.
     pub tried: Vec<CandidateFit>,
     /// The fits of all forms that reduce the training error.
     pub fits: Vec<ScoredModel>,
@@ -142,12 +144,12 @@ impl Round {
     }
 }
 
-/// Adds every effect to a base model in turn.
+/// Adds each effect to a base model, one at a time.
 pub fn try_all(base: &BaseModel, records: &Records, workers: Workers) -> Round {
     try_effects(base, |_| true, base.effort(), records, workers)
 }
 
-/// Adds every effect of some to a base model in turn.
+/// Adds each of some effects to a base model, one at a time.
 pub fn try_effects(
     base: &BaseModel,
     among: impl Fn(&Effect) -> bool,
@@ -184,7 +186,7 @@ pub fn listed(structure: &Structure) -> impl Iterator<Item = &'static Effect> + 
     })
 }
 
-/// Sets the probability of each gain, for the number of effects that were tried.
+/// Sets the p-value of each gain, corrected for the number of effects tried.
 fn set_p_values(tried: &mut [CandidateFit], base: &ScoredModel) {
     let models = tried.iter().filter_map(|c| c.model.as_ref());
     let comparisons: Vec<Comparison> = models.map(|model| model.against(base)).collect();
@@ -232,7 +234,7 @@ impl CandidateFit {
         }
     }
 
-    /// The effects of its model.
+    /// Names of the effects of its model.
     pub fn names(&self) -> Vec<&'static str> {
         [&self.with[..], &[self.effect.name]].concat()
     }
@@ -241,8 +243,8 @@ impl CandidateFit {
         self.reason.status()
     }
 
-    /// Whether it reduces the error by more than chance. A line or a drift that the held-out records do not have is noise that
-    /// rings or wanders.
+    /// Whether it reduces the error significantly. A line or a drift that the held-out records do not have is
+    /// correlated noise.
     pub fn is_confirmed(&self) -> bool {
         let effects = self
             .model
@@ -259,7 +261,7 @@ impl CandidateFit {
     }
 }
 
-/// Rejects every candidate that has not been rejected yet, for a reason.
+/// Rejects all remaining candidates for a reason.
 pub fn reject_all(tried: &mut [CandidateFit], reason: impl Fn(&CandidateFit) -> Reason) {
     let named = tried.iter_mut().filter(|t| t.status() != Status::Rejected);
     for candidate in named {
@@ -267,9 +269,9 @@ pub fn reject_all(tried: &mut [CandidateFit], reason: impl Fn(&CandidateFit) -> 
     }
 }
 
-/// The best fit of each form, scored. The forms whose starts leave least get a first fit (all of them if there is no effect
-/// yet), those that reduce the training error a second one, and those that reduce it nearly most a full one. The
-/// amount of work depends on the records alone, not on the clock.
+/// The best fit of each form, scored. The forms whose starts have the smallest residuals get a first fit (all of them
+/// if there is no effect yet), those that reduce the training error a second one, and those close to the largest
+/// reduction a full one. The amount of work depends on the records alone, not on the clock.
 pub fn fit_all(
     base: &BaseModel,
     forms: &[EffectForm],
@@ -314,8 +316,8 @@ pub fn fit_all(
     fits
 }
 
-/// A fit carried on as long as the error falls much: where a light damping lets small errors of the frequency add up, it falls
-/// slowly at first.
+/// A fit continued while the error falls substantially: with light damping, small frequency errors accumulate, and
+/// convergence is slow at first.
 fn to_the_end(fit: &FittedModel, records: &Records) -> FittedModel {
     let mut best = fit.clone();
     for _ in 0..MOST_FULL_FITS {
@@ -332,7 +334,7 @@ fn to_the_end(fit: &FittedModel, records: &Records) -> FittedModel {
 }
 
 impl BaseModel {
-    /// How many forms are fitted beside it.
+    /// Number of forms fitted in addition to it.
     pub fn effort(&self) -> &'static SearchEffort {
         match self.scored.fitted.structure.effects.is_empty() {
             true => &FOR_FIRST_EFFECT,
@@ -341,7 +343,7 @@ impl BaseModel {
     }
 }
 
-/// Fits with very few iterations from the best starts of each form, where these leave least.
+/// Fits with very few iterations from the best starts of each form with the smallest residuals.
 fn first_fits(
     base: &BaseModel,
     forms: &[EffectForm],
@@ -378,8 +380,8 @@ fn first_fits(
     })
 }
 
-/// Fits with very few iterations. For the first effect beside several modes another one comes to the records by their beginnings:
-/// errors of frequencies have not added up to turns there.
+/// Fits with very few iterations. For the first effect with several modes, they start from the beginnings of the
+/// records, where errors of frequencies have not yet accumulated to turns.
 fn first_fits_from(
     structure: &Structure,
     start: &[f64],
@@ -396,7 +398,7 @@ fn first_fits_from(
         .collect()
 }
 
-/// A fit that goes on from beginnings of the records to the whole.
+/// A fit continued from the beginnings of the records to the whole.
 fn from_beginnings(
     mut structure: Structure,
     start: &[f64],
@@ -411,7 +413,7 @@ fn from_beginnings(
     fit(structure, &values, records, FIRST_FIT)
 }
 
-/// Lines that stand out of the residual on the training records.
+/// Significant lines of the training residual.
 fn residual_lines(base: &BaseModel, records: &Records) -> Vec<SpectralLine> {
     let highest_hz = 0.45 * records.rate_hz();
     let mut found = lines_of(&base.scored.train, highest_hz, 4 * LINES);
@@ -431,7 +433,7 @@ pub fn refusal(model: &ScoredModel, before: &ScoredModel) -> Option<Reason> {
     (model.criterion() >= before.criterion()).then_some(Reason::CriterionNotLower)
 }
 
-/// Why a model is not better than one with less in it.
+/// Why a model is not better than a simpler one.
 pub fn no_gain(model: &ScoredModel, before: &ScoredModel) -> Option<Reason> {
     let comparison = model.against(before);
     let (gain, variance) = (comparison.gain(), model.compared_rms().powi(2));
@@ -455,8 +457,8 @@ pub fn no_gain(model: &ScoredModel, before: &ScoredModel) -> Option<Reason> {
     None
 }
 
-/// By how many times a gain, with so many parameters from so many samples, meets what [`refusal`] asks of it, whatever the
-/// noise, with 95 % certainty.
+/// Ratio of a gain, for the number of parameters and samples, to what [`refusal`] requires, whatever the noise, with 95
+/// % confidence.
 pub fn evidence(comparison: &Comparison, samples: usize, parameters: usize) -> f64 {
     let [gain, std] = comparison.expected_gain();
     let sure = gain - CERTAIN * std;

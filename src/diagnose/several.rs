@@ -1,5 +1,5 @@
-//! The way from the plain stand to one with effects: singles, pairs, one after the other; what is not needed goes again, and
-//! laws beside the list may speak against what is left.
+//! From the plain stand to one with effects: singles, pairs, one after the other; unnecessary effects are removed, and
+//! guard models may contradict the remainder.
 
 use std::cell::LazyCell;
 
@@ -15,19 +15,20 @@ use super::score::{BaseModel, ScoredModel};
 use super::search::{self, CandidateFit, Round, SAME, Workers, no_gain, refusal, reject_all};
 use super::verdict::{PlainExcess, is_above, noise_rms, remains};
 
-/// Most effects that are added.
+/// Maximum number of added effects.
 const MOST_EFFECTS: usize = 5;
 
-/// Ways to several effects that are followed: the second if the first leaves more than noise, or if it begins with less.
+/// Number of search paths followed: the second if the first leaves more than noise, or if it starts with a smaller
+/// residual.
 const WAYS: usize = 2;
 
-/// Excess error power of a law beside the list, over that of the best effect, up to which nothing else is looked for.
+/// Excess error power of a guard model, relative to that of the best effect, below which the search ends.
 const FAR_LESS: f64 = 0.1;
 
-/// Error over the differences of the periods up to which nothing but noise is left.
+/// Ratio of the error to the noise from differences between periods up to which only noise is left.
 const ALL_NOISE: f64 = 1.005;
 
-/// Where a way to several effects led.
+/// End of a search path.
 struct Way {
     after: ScoredModel,
     tests: ResidualTests,
@@ -37,7 +38,7 @@ struct Way {
 }
 
 impl SearchState {
-    /// Adds effects to the plain stand. `coarse` is the number of steps of integration for that.
+    /// Adds effects to the plain stand. `coarse` is the number of integration steps for it.
     pub(super) fn build(&mut self, coarse: usize, workers: Workers) {
         let base = BaseModel::of(self.before.clone(), &self.records);
         let round = search::try_all(&base, &self.records, workers);
@@ -67,7 +68,8 @@ impl SearchState {
         if let Some(way) = best {
             self.arrive(way);
         }
-        // Where what only resembled an effect is gone, what it hid may show, and be exchanged in turn.
+        // Once an effect that only resembled another is gone, what it hid may appear, and be exchanged
+        // in turn.
         while self.exchange(coarse, workers) || self.exchange_with_gain(coarse, workers) {
             let count = self.after.effect_names().len();
             while self.has_room() && self.add_another(coarse, workers) {}
@@ -79,8 +81,8 @@ impl SearchState {
         self.ask_guards(&base, workers);
     }
 
-    /// A law beside the list that leaves nothing but noise, or far less than the best effect: several effects in its place
-    /// would only imitate it.
+    /// A guard model that leaves only noise, or far less than the best effect: several effects in its place would only
+    /// imitate it.
     fn only_law(
         &mut self,
         base: &BaseModel,
@@ -101,7 +103,7 @@ impl SearchState {
         })
     }
 
-    /// The laws beside the list beside the plain stand, fitted anew only with other steps of integration.
+    /// The plain stand with each guard model, refitted only for a different number of integration steps.
     fn rivals(&mut self, base: &BaseModel, workers: Workers) -> Vec<ScoredModel> {
         let steps = self.records.substeps();
         if self.rivals.as_ref().is_none_or(|(of, _)| *of != steps) {
@@ -114,8 +116,8 @@ impl SearchState {
             .collect()
     }
 
-    /// Where ways begin: with the best effect, with the best pair if that explains more; that first if the best effect is in no
-    /// such pair.
+    /// Starts of the search paths: the best effect, and the best pair if that explains more; the pair comes first if it
+    /// does not contain the best effect.
     fn starts(&self, base: &BaseModel, round: &Round, workers: Workers) -> Vec<ScoredModel> {
         let single = round.accepted();
         let tests = single.map(super::tests);
@@ -133,7 +135,7 @@ impl SearchState {
                 .as_ref()
                 .is_none_or(|noisier| noisier.bear_out(model, pair))
         };
-        // Of two descriptions that do as well, the one with fewer parameters: a pair may replace an effect with many.
+        // Of two equivalent descriptions, the one with fewer parameters: a pair may replace an effect with many.
         let is_simpler = |pair: &ScoredModel| {
             pair.parameter_count() < model.parameter_count()
                 && pair.criterion() < model.criterion() + SAME
@@ -143,7 +145,7 @@ impl SearchState {
             is_simpler(pair) || refusal(pair, model).is_none() && is_borne_out(pair)
         });
         if let Some(single) = single {
-            // Beside the best effect all others are compared, ties included.
+            // With the best effect all others are compared, including ties.
             let name = single.effect_names()[0];
             let is_part = |pair: &ScoredModel| pair.effect_names().contains(&name);
             let place = usize::from(!starts.is_empty() && !starts.iter().any(is_part));
@@ -152,7 +154,7 @@ impl SearchState {
         starts
     }
 
-    /// Follows one way from its start to further effects.
+    /// Follows a search path from its start to further effects.
     fn follow(&mut self, start: &ScoredModel, coarse: usize, workers: Workers) -> Way {
         let rounds = self.rounds.clone();
         self.path.clear();
@@ -167,7 +169,7 @@ impl SearchState {
         }
     }
 
-    /// Takes over where a way led.
+    /// Adopts the end of a search path.
     fn arrive(&mut self, way: Way) {
         self.after = way.after;
         self.tests = way.tests;
@@ -176,12 +178,12 @@ impl SearchState {
         self.path = way.path;
     }
 
-    /// Adds one more effect; whether there was one.
+    /// Adds one more effect; returns whether there was one.
     fn add_another(&mut self, coarse: usize, workers: Workers) -> bool {
         let base = BaseModel::of(self.after.clone(), &self.records);
         let round = search::try_all(&base, &self.records, workers);
         let accepted = round.accepted();
-        // Where little is left, only what takes nearly all of it.
+        // If little is left, the effect must explain nearly all of it.
         let is_little = !self.is_worthwhile(&self.after, &self.tests);
         let excess = self.excess();
         let next = accepted.filter(|next| match is_little {
@@ -200,7 +202,7 @@ impl SearchState {
         next.is_some()
     }
 
-    /// Makes a model the one with the effects found so far.
+    /// Adopts a model as the current one with effects.
     pub(super) fn take(&mut self, next: &ScoredModel, coarse: usize) {
         let next = next.with_modes_fitted(&self.records);
         (self.after, self.settled) = next.refine_step(&mut self.records, coarse);
@@ -208,7 +210,7 @@ impl SearchState {
         self.path.push(self.after.clone());
     }
 
-    /// Whether another effect is looked for: not beside a law for which the integration does not converge.
+    /// Whether to look for another effect: not with a law for which the integration does not converge.
     pub(super) fn has_room(&self) -> bool {
         let count = self.after.effect_names().len();
         let is_open = (1..MOST_EFFECTS).contains(&count) && self.settled;
@@ -216,20 +218,20 @@ impl SearchState {
         is_open && (self.is_worthwhile(after, &self.tests) || is_above(after, floor))
     }
 
-    /// Whether a model leaves enough for another effect: something above the noise, or a residual that is not noise alone
-    /// and larger than the differences of the periods.
+    /// Whether a model leaves enough for another effect: something above the noise, or a residual that is not just
+    /// noise and exceeds the differences between periods.
     pub(super) fn is_worthwhile(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
         let is_noise = tests.white && tests.independent_of_input;
         let floor = self.noise_floor;
         let of_periods = floor.filter(|floor| floor.from == NoiseFloorSource::Periods);
         let is_at_floor =
             of_periods.is_some_and(|floor| model.compared_rms() <= ALL_NOISE * floor.rms);
-        // What does not repeat with the input is part of that floor.
+        // Anything not periodic with the input is part of that floor.
         let is_at_floor = is_at_floor && !tests.drifts() && self.lines_of(model).is_empty();
         remains(model, tests, floor) || !is_noise && !is_at_floor
     }
 
-    /// Takes out again what is not needed. What is known of the model without each of its effects is not fitted again.
+    /// Removes unnecessary effects. Known fits of the model without each of its effects are reused.
     pub(super) fn eliminate(&mut self, threads: usize) {
         while self.after.effect_names().len() > 1 {
             if self.without.is_empty() {
@@ -257,7 +259,7 @@ impl SearchState {
         }
     }
 
-    /// The effect that is missed least, if its absence does not show.
+    /// The least needed effect, if its removal is not significant.
     fn needless(&self, without: &[Option<ScoredModel>]) -> Option<usize> {
         let (after, excess) = (&self.after, self.excess());
         let noisier = LazyCell::new(|| NoisierRecords::of(&self.records));
@@ -276,7 +278,7 @@ impl SearchState {
         least.map(|(k, _)| k)
     }
 
-    /// Asks laws beside the list whether they explain more: than all effects, than each of several, and beside all.
+    /// Tests whether guard models explain more: than all effects, than each of several, and in addition to all.
     fn ask_guards(&mut self, base: &BaseModel, workers: Workers) {
         let noise_rms = noise_rms(self.noise_floor);
         let count = self.after.effect_names().len();
@@ -308,7 +310,7 @@ impl SearchState {
         }
     }
 
-    /// Goes back to a model with fewer effects, as a law beside the list explains more than the others.
+    /// Reverts to a model with fewer effects, as a guard model explains more than the others.
     fn withdraw(&mut self, guard: GuardModel, less: ScoredModel) {
         let kept = less.effect_names();
         for round in &mut self.rounds {
@@ -323,7 +325,7 @@ impl SearchState {
         self.suspected = Some(guard);
     }
 
-    /// What the plain stand leaves, and the noise in it.
+    /// Residual of the plain stand, and the noise in it.
     pub(super) fn excess(&self) -> PlainExcess<'_> {
         PlainExcess {
             before: &self.before,
@@ -331,7 +333,7 @@ impl SearchState {
         }
     }
 
-    /// Brings the candidates in line with the effects that were added in the end.
+    /// Updates the candidates to the finally accepted effects.
     pub(super) fn settle_candidates(&mut self) {
         let names = self.after.effect_names();
         let left = self.after.train_rms();

@@ -1,8 +1,8 @@
 //! A stand with several modes.
 //!
-//! A fit moves the first mode, as of a stand that has no other. The numbers of the further ones are fitted in full once, before
-//! effects are looked for. Beside effects they change little: there a fit takes them along in proportion, as columns that the
-//! residuals of all records share, and corrects them at its end.
+//! A fit moves the first mode, as for a single-mode stand. The parameters of the further ones are fitted in full once,
+//! before the search for effects. With effects they change little: a fit then includes them linearly, as columns shared
+//! by the residuals of all records, and corrects them at its end.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -23,26 +23,27 @@ use super::unexplained::raw_residuals;
 /// All modes of a stand.
 #[derive(Debug, Clone)]
 pub struct SeveralModes {
-    /// The first is that of the plain stand but for its part in the response.
+    /// The first is that of the plain stand except for its contribution to the response.
     pub parts: Vec<ModalPart>,
-    /// Standard uncertainties of frequency in Hz, damping ratio, residue and quadrature of each, where a fit found them.
+    /// Standard uncertainties of frequency in Hz, damping ratio, residue and quadrature of each, if fitted.
     pub stds: Vec<[Option<f64>; 4]>,
-    /// Whether the parts follow from shapes at load and gage, which stay.
+    /// Whether the contributions follow from fixed mode shapes at load and gage.
     pub has_shapes: bool,
-    /// Whether a fit moves them.
+    /// Whether they are fit parameters.
     pub are_free: bool,
 }
 
-/// A fit of all modes beside effects that were found.
+/// A fit of all modes together with the effects found.
 const IN_FULL: FitEffort = FitEffort::full(30);
 
-/// Error after such a fit, over that before, up to which it counts.
+/// Ratio of the error after such a fit to that before, up to which it is accepted.
 const AS_GOOD: f64 = 1.001;
 
-/// Bounds of a natural frequency over that of before, of a damping ratio, and of the two parts of a residue.
+/// Bounds of a natural frequency relative to its previous value, of a damping ratio, and of the two parts of
+/// a residue.
 const BOUNDS: [[f64; 2]; 4] = [[0.8, 1.25], [0.0, 1.0], [-1e3, 1e3], [-1e3, 1e3]];
 
-/// Units of a mode's numbers.
+/// Units of the parameters of a mode.
 const UNITS: [&str; 4] = ["Hz", "", "", ""];
 
 impl SeveralModes {
@@ -57,18 +58,18 @@ impl SeveralModes {
         })
     }
 
-    /// Whether it is known how a torque at the gage moves it.
+    /// Whether the response of the gage to a torque at the gage is known.
     pub fn show_torques(&self) -> bool {
         self.parts.iter().all(|part| part.at_gage.is_some())
     }
 
-    /// The modes beside the first.
+    /// The modes other than the first.
     pub fn further(&self) -> impl Iterator<Item = Mode> {
         self.parts[1..].iter().map(|part| part.mode)
     }
 
-    /// The numbers that a fit moves, as mode and place among frequency, damping ratio, residue and quadrature. Those of the first
-    /// mode's motion are the plain stand's; residues follow from shapes.
+    /// Fit parameters, as mode and index among frequency, damping ratio, residue and quadrature. Frequency and damping
+    /// of the first mode are the plain stand's; residues follow from mode shapes.
     fn moved(&self) -> Vec<(usize, usize)> {
         let is_moved = |(mode, number): &(usize, usize)| match number {
             0 | 1 => *mode > 0,
@@ -80,12 +81,12 @@ impl SeveralModes {
         all.flat_map(of_mode).filter(is_moved).collect()
     }
 
-    /// Number of values that a fit moves.
+    /// Number of fit parameters.
     pub fn count(&self) -> usize {
         self.moved().len()
     }
 
-    /// The values of these modes.
+    /// Values of the fit parameters.
     pub fn values(&self) -> Vec<f64> {
         let value = |(mode, number): (usize, usize)| {
             let part = &self.parts[mode];
@@ -94,8 +95,8 @@ impl SeveralModes {
         self.moved().into_iter().map(value).collect()
     }
 
-    /// Lower and upper bound of each value. Parts that all have one sign keep it: of these it is known how torques at the gage
-    /// move it.
+    /// Lower and upper bound of each fit parameter. Contributions that all have one sign keep it: for these, the
+    /// response to torques at the gage is known.
     pub fn bounds(&self) -> Vec<[f64; 2]> {
         let keeps_sign = self.show_torques();
         let bounds = |(_, number): (usize, usize)| match number {
@@ -105,7 +106,7 @@ impl SeveralModes {
         self.moved().into_iter().map(bounds).collect()
     }
 
-    /// All modes, with values of a fit and the first mode as the fit has it.
+    /// All modes, from values of a fit and its first mode.
     fn with(&self, first: Mode, values: &[f64]) -> Vec<ModalPart> {
         let mut parts = self.parts.clone();
         for ((mode, number), value) in self.moved().into_iter().zip(values) {
@@ -125,7 +126,7 @@ impl SeveralModes {
         parts
     }
 
-    /// With shapes that stay, a mode's parts go with `1/ω²`, over their sums.
+    /// With fixed mode shapes, a mode's contributions go with `1/ω²`, normalised by their sums.
     fn follow_shapes(&self, parts: &mut [ModalPart]) {
         let was = self.parts.iter().map(|part| part.mode.omega_rad_s);
         let softer = was.zip(&*parts);
@@ -143,7 +144,7 @@ impl SeveralModes {
         }
     }
 
-    /// The response, with values of a fit and the first mode as the fit has it.
+    /// The response, from values of a fit and its first mode.
     pub fn response(&self, first: Mode, values: &[f64]) -> ModalResponse {
         ModalResponse::new(self.with(first, values))
             .expect("modes within the bounds of a fit are modes")
@@ -174,7 +175,7 @@ impl SeveralModes {
         both.map(of_mode).collect()
     }
 
-    /// The same with these numbers changed by so much, as far as the bounds allow.
+    /// The same with changed parameters, clamped to the bounds.
     fn changed(&self, changes: &[f64]) -> Self {
         let free = Self {
             are_free: true,
@@ -190,7 +191,7 @@ impl SeveralModes {
         }
     }
 
-    /// The modes that a fit found, which stay from here on.
+    /// The fitted modes, which are fixed from here on.
     fn found(&self, fitted: &FittedModel, of_modes: Range<usize>) -> Self {
         let mut stds = self.stds.clone();
         let places = self.moved().into_iter().zip(&fitted.std[of_modes.clone()]);
@@ -210,7 +211,7 @@ impl SeveralModes {
     }
 }
 
-/// Where load and gage count as one place, each mode's part there is that of its residue.
+/// If load and gage count as one place, each mode's contribution there is its residue.
 fn follow_residues(parts: &mut [ModalPart]) {
     let sum: f64 = parts.iter().map(|part| part.residue).sum();
     for part in parts.iter_mut().filter(|part| part.at_gage.is_some()) {
@@ -218,17 +219,18 @@ fn follow_residues(parts: &mut [ModalPart]) {
     }
 }
 
-/// How the modes that a fit does not move change the residuals.
+/// Derivatives of the residuals with respect to modes that a fit does not move.
 pub struct ModeSlopes {
     columns: Columns,
     several: SeveralModes,
 }
 
-/// Step of the numbers of modes for differences.
+/// Finite-difference step of the mode parameters.
 const STEP: f64 = 1e-6;
 
 impl ModeSlopes {
-    /// Of records with their nuisance terms, at values of the other parameters; none for a stand with one mode, or where a fit moves all.
+    /// For records with their nuisance terms, at values of the other parameters; `None` for a single-mode stand, or if
+    /// a fit moves all modes.
     pub fn of(
         structure: &Structure,
         values: &[f64],
@@ -258,12 +260,12 @@ impl ModeSlopes {
         })
     }
 
-    /// Takes out of the residuals of all records what other modes would.
+    /// Removes from the residuals of all records what a change of the modes would explain.
     pub fn clear(&self, residuals: &mut [f64]) {
         self.columns.clear(residuals);
     }
 
-    /// The modes that leave least of residuals, and whether they leave so much less that they are worth another fit.
+    /// The modes that minimise the residuals, and whether the improvement is worth another fit.
     pub fn modes(&self, residuals: &mut [f64]) -> (SeveralModes, bool) {
         let before = dot(residuals, residuals);
         let changes = self.columns.fit(residuals);
@@ -273,8 +275,8 @@ impl ModeSlopes {
     }
 }
 
-/// Derivatives of the raw residual of a record by each number of the modes that a fit does not move; none
-/// for a stand with one mode.
+/// Derivatives of the raw residual of a record with respect to each parameter of the modes that a fit
+/// does not move; empty for a single-mode stand.
 pub fn slopes_of_modes(
     structure: &Structure,
     values: &[f64],
@@ -316,7 +318,8 @@ impl Structure {
     }
 }
 
-/// Fits a model with all numbers of all modes; those of the further modes stay from there on.
+/// Fits a model with all parameters of all modes; those of the further modes are fixed from then
+/// on.
 ///
 /// # Errors
 /// If the model cannot be evaluated at the start.
@@ -353,8 +356,8 @@ pub fn fit_with_modes(
 }
 
 impl ScoredModel {
-    /// The model with all numbers of all modes fitted again, which gives their uncertainties, unless that leaves more; of a stand with
-    /// one mode the same.
+    /// The model refitted with all parameters of all modes, which gives their uncertainties, unless the residual
+    /// increases; unchanged for a single-mode stand.
     pub fn with_modes_fitted(&self, records: &Records) -> Self {
         let fitted = &self.fitted;
         if fitted.structure.context.several.is_none() {

@@ -1,4 +1,5 @@
-//! A shift between the channels of records, or between their clocks, weighed against effects.
+//! A shift between the channels of records, or between their clocks, compared with effects as an
+//! explanation.
 
 use super::alignment::{Alignment, Shift};
 use super::record::StandRecord;
@@ -14,18 +15,19 @@ use crate::print::{relative, rounded};
 use crate::warning::Warning;
 use torqcomp_dsp::dot;
 
-/// Relative error of the plain stand from which on a shift of the channels is looked for.
+/// Relative error of the plain stand above which a shift of the channels is considered.
 const NOTABLE_ERROR: f64 = 0.02;
-/// Error with the channels aligned, over that as given, below which they count as shifted, and as of two clocks.
+/// Ratio of the error with aligned channels to that as given, below which they count as shifted, and as having
+/// two clocks.
 const SHIFTED: f64 = 0.2;
 const TWO_CLOCKS: f64 = 0.5;
-/// Reduction of the criterion from effects to channels aligned from which on the shift explains more, and error over that with
-/// effects up to which it explains as much.
+/// Minimum reduction of the criterion from effects to aligned channels for the shift to explain more, and ratio of the
+/// errors up to which it explains as much.
 const BETTER: f64 = 10.0;
 const MUCH_LESS: f64 = 0.7;
 const AS_GOOD: f64 = 1.05;
 
-/// Refuses channels of two clocks, and a measured channel that comes long before the applied one.
+/// Rejects channels of two clocks, and a measured channel that is far ahead of the applied one.
 pub fn refuse(case: &Case, alignment: &Alignment) -> Result<(), Failure> {
     let [as_given, error] = alignment.errors;
     let (shift, train) = (alignment.shift, &case.records.train);
@@ -39,8 +41,8 @@ pub fn refuse(case: &Case, alignment: &Alignment) -> Result<(), Failure> {
     Err(Failure::failed(ErrorCode::UnsuitableRecord, text).at(&train[0].source))
 }
 
-/// Weighs a shift of the channels against the effects that were found. `smooth` are the records with an input of limited band,
-/// if the effects were found with another one.
+/// Compares a shift of the channels with the effects found. `smooth` are the records with band-limited input, if the
+/// effects were found with another one.
 pub fn weigh(
     found: &SearchState,
     smooth: Option<&Records>,
@@ -68,7 +70,7 @@ pub fn weigh(
     let count: usize = records.train.iter().map(StandRecord::count).sum();
     // The shift is one more parameter.
     let criterion = shifted.criterion() + (count as f64).ln();
-    // A low-pass is a lag, too, and usually the better one.
+    // A low-pass is a lag, too, and usually the better explanation.
     let has_lag = shift.late_s > 0.0 && effects.contains(&"recorder-lowpass");
     let is_less = !has_lag || shifted.train_rms() < MUCH_LESS * after.train_rms();
     if is_less && criterion < after.criterion() - BETTER {
@@ -100,15 +102,15 @@ pub fn weigh(
     })
 }
 
-/// What a shift of the channels explains.
+/// Explanation by a shift of the channels.
 pub struct ShiftWarning {
     pub warning: Warning,
-    /// Whether it explains the records better than the effects that were found.
+    /// Whether it explains the records better than the effects found.
     pub outdoes: bool,
 }
 
-/// A shift of the channels that lowers the error of the plain stand, where effects were found that resemble one, or something is
-/// left.
+/// A shift of the channels that reduces the error of the plain stand, if effects were found that resemble one, or a
+/// residual remains.
 pub fn find(case: &Case, context: &FitContext, found: &SearchState) -> Option<Alignment> {
     if case.records.are_free() {
         return None;
@@ -118,14 +120,14 @@ pub fn find(case: &Case, context: &FitContext, found: &SearchState) -> Option<Al
         return None;
     }
     let as_given = relative_error(context, &case.records.train);
-    // Above that it was looked for before.
+    // Above that it has already been tried.
     (NOTABLE_ERROR..LARGE_ERROR)
         .contains(&as_given)
         .then(|| Alignment::find(case, context, as_given))
         .flatten()
 }
 
-/// The rms of measured records, about their means.
+/// RMS of measured records about their means.
 struct RelativeTo(f64);
 
 impl RelativeTo {
@@ -143,7 +145,7 @@ impl RelativeTo {
     }
 }
 
-/// A shift in samples and in ms.
+/// A shift in samples and in ms, as text.
 fn stated(shift_s: f64, rate_hz: f64) -> String {
     let samples = rounded(shift_s * rate_hz, 3);
     let plural = if samples == "1" { "" } else { "s" };

@@ -1,5 +1,5 @@
-//! Special cases, fitted from where the general case ended: dry friction is Stribeck's without a drop, and a fit that goes astray
-//! with one parameter may find its way with three.
+//! Special cases, fitted from the result of the general case: dry friction is Stribeck friction without a drop, and a
+//! fit that gets stuck with one parameter may converge with three.
 
 use torqcomp_model::effects::{EffectParameter, Form};
 
@@ -10,12 +10,14 @@ use super::search::{SAME, Workers, listed};
 use super::structure::EffectForm;
 use crate::parallel::parallel;
 
-/// The fit of a special case, which starts near its end.
+/// Fit of a special case, which starts near its minimum.
 const SPECIAL_CASE: FitEffort = FitEffort::full(15);
-/// Sum of squares of a general case, over that of the special one, above which that has found what there is to find.
+/// Ratio of the sum of squares of a general case to that of the special one, above which the special one needs no
+/// refit.
 const MUCH_LESS: f64 = 0.9;
 
-/// Fits the forms anew that have much more left than the best general case of theirs, where that gains as much as given.
+/// Refits the forms whose residual is much larger than that of the best general case, if that gains at least the given
+/// amount.
 pub fn fit_special_cases(
     forms: &[EffectForm],
     fits: &mut [Option<ScoredModel>],
@@ -49,7 +51,7 @@ pub fn fit_special_cases(
 }
 
 impl EffectForm {
-    /// Whether all its parameters are among those of a form of the same effect, or of one that resembles it, which has more.
+    /// Whether its parameters are a subset of those of a form of the same effect, or of one that resembles it.
     fn is_special_case_of(&self, other: &Self) -> bool {
         let (own, others) = (self.form.parameters, other.form.parameters);
         let has = |p: &EffectParameter| others.iter().any(|o| o.name == p.name);
@@ -60,7 +62,8 @@ impl EffectForm {
 }
 
 impl ScoredModel {
-    /// The model with the best special case of its last effect, where a parameter that makes it more than that is zero.
+    /// The model with the best special case of its last effect, if a parameter that distinguishes the general case is
+    /// zero.
     pub fn simplified(self, records: &Records, threads: usize) -> Self {
         let structure = &self.fitted.structure;
         let Some(last) = structure.effects.last().copied() else {
@@ -81,7 +84,7 @@ impl ScoredModel {
             .unwrap_or(self)
     }
 
-    /// The last effect's special case, fitted from the values that it has.
+    /// The last effect's special case, fitted from its present values.
     fn in_special_case(&self, special: EffectForm, records: &Records) -> Option<Self> {
         let mut structure = self.fitted.structure.clone();
         let general = structure.effects.pop()?;
@@ -95,8 +98,8 @@ impl ScoredModel {
     }
 }
 
-/// Values of an effect in another form: those of the same name or, where both have as many, in the same place; otherwise those that
-/// the form starts with.
+/// Values of an effect in another form: those of the same name or, if both have as many, of the same index; otherwise
+/// the form's start values.
 pub fn own_in_form(form: &Form, present: &Form, own: &[f64]) -> Vec<f64> {
     let (names, have) = (form.parameters, present.parameters);
     let value = |(i, parameter): (usize, &EffectParameter)| {
@@ -105,7 +108,7 @@ pub fn own_in_form(form: &Form, present: &Form, own: &[f64]) -> Vec<f64> {
         let start = || form.starts.first().and_then(|start| start.get(i));
         let found = place.and_then(|place| own.get(place)).or_else(start);
         let value = found.copied().unwrap_or(parameter.lower);
-        // What may be of either sign in one form need not be in another.
+        // A parameter of either sign in one form may be one-sided in another.
         value.clamp(parameter.lower, parameter.upper)
     };
     names.iter().enumerate().map(value).collect()

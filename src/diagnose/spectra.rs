@@ -12,7 +12,7 @@ use super::fit::RecordResidual;
 /// Spectra of half-overlapping segments of a record, with a Hann window.
 pub struct SegmentSpectra {
     pub segments: Vec<Vec<Complex64>>,
-    /// Samples of a segment.
+    /// Segment length in samples.
     pub length: usize,
 }
 
@@ -29,7 +29,7 @@ pub fn spectra(samples: &[f64], length: usize) -> SegmentSpectra {
         let mean = segment.iter().sum::<f64>() / length as f64;
         let windowed = segment.iter().zip(&window).map(|(x, w)| (x - mean) * w);
         let mut spectrum = plan.make_output_vec();
-        // The lengths are those that the plan was made for.
+        // Cannot fail: the lengths match the plan.
         let _ = plan.process(&mut windowed.collect::<Vec<f64>>(), &mut spectrum);
         segments.push(spectrum);
         from += length / 2;
@@ -38,12 +38,12 @@ pub fn spectra(samples: &[f64], length: usize) -> SegmentSpectra {
 }
 
 impl SegmentSpectra {
-    /// Number of frequencies, from 0 to half the sampling rate.
+    /// Number of frequencies, from 0 to the Nyquist frequency.
     pub fn frequencies(&self) -> usize {
         self.segments.first().map_or(0, Vec::len)
     }
 
-    /// Power at each frequency such that the sum over frequencies is the mean square.
+    /// Power at each frequency, normalised so that the sum is the mean square.
     pub fn power(&self) -> Vec<f64> {
         let count = self.segments.len().max(1) as f64;
         // The sum of the squared window is 3/8 of the length; both signs of frequency.
@@ -53,15 +53,15 @@ impl SegmentSpectra {
     }
 }
 
-/// Energy of samples at each frequency from 0 to half the sampling rate, such that the sum over all is that over the samples;
-/// averaged over so many resolved frequencies to each side.
+/// Energy of samples at each frequency from 0 to the Nyquist frequency, normalised so that the sum equals that over the
+/// samples; averaged over `to_each_side` frequencies on each side.
 pub fn energy_spectrum(samples: &[f64], to_each_side: usize) -> Vec<f64> {
     let length = samples.len().next_power_of_two();
     let plan = torqcomp_fourier::forward(length);
     let mut padded = samples.to_vec();
     padded.resize(length, 0.0);
     let mut spectrum = plan.make_output_vec();
-    // The length is the one that the plan was made for.
+    // Cannot fail: the length matches the plan.
     let _ = plan.process(&mut padded, &mut spectrum);
     let last = spectrum.len() - 1;
     let sides = |k: usize| if k == 0 || k == last { 1.0 } else { 2.0 };
@@ -83,13 +83,13 @@ pub fn energy_spectrum(samples: &[f64], to_each_side: usize) -> Vec<f64> {
     (0..=last).map(around).collect()
 }
 
-/// Power of an input at a frequency, over its mean at all of them, below which it may be noise: noise of 1 % of the input is
-/// 1e-4 of it. A stand answers noise on the input as well, and what it answers follows from it.
+/// Power of an input at a frequency, relative to its mean over all, below which it may be noise: 1 % noise has 1e-4 of
+/// the power. A stand also responds to noise on the input, and that response is coherent with it.
 pub const ONLY_NOISE: f64 = 2.5e-4;
 
-/// Share of the power of `output` that follows linearly from `input`, at frequencies where that is more than noise, and how
-/// many standard deviations it lies above zero. Segments are only compared with other segments, so that noise adds nothing
-/// on average: with those beyond the samples over which noise on the output, which may ring with the stand, remembers.
+/// Share of the power of `output` linear in `input`, at frequencies where that is more than noise, and its distance
+/// from zero in standard deviations. Segments are only compared with other segments, beyond the correlation time of the
+/// noise on the output (which may ring with the stand), so that noise adds nothing on average.
 pub fn coherent_share(
     input: &[f64],
     output: &[f64],
@@ -100,7 +100,7 @@ pub fn coherent_share(
     let (mut explained, mut total, mut variance) = (0.0, 0.0, 0.0);
     let power = u.power();
     let least = ONLY_NOISE * power.iter().sum::<f64>() / power.len().max(1) as f64;
-    // A model on the way may have no damping at all.
+    // A trial model may have no damping at all.
     let memory = (memory_samples / (0.5 * length as f64)).min(u.segments.len() as f64);
     let apart = 1 + (1.5 * memory) as usize;
     for k in 0..u.frequencies() {
@@ -112,7 +112,8 @@ pub fn coherent_share(
         if uu <= 0.0 || power[k] < least {
             continue;
         }
-        // Neighbours overlap and share noise: they are excluded like a segment's product with itself.
+        // Neighbours overlap and share noise, so they are excluded like a segment's product with
+        // itself.
         let sum: Complex64 = cross.iter().sum();
         let mut pairs = sum.norm_sqr();
         for (i, c) in cross.iter().enumerate() {
@@ -127,7 +128,7 @@ pub fn coherent_share(
     if total <= 0.0 || variance <= 0.0 {
         return (0.0, 0.0);
     }
-    // So many segments in turn have the same noise.
+    // This many consecutive segments share the same noise.
     let std = (2.0 * variance).sqrt() * memory.max(1.0);
     (explained / total, explained / std)
 }
@@ -145,21 +146,21 @@ pub struct SpectralLine {
 }
 
 impl SpectralLine {
-    /// The same line with its amplitude in a unit.
+    /// The same line with its amplitude in another unit.
     pub fn over(self, unit: f64) -> Self {
         let amplitude = self.amplitude / unit;
         Self { amplitude, ..self }
     }
 }
 
-/// Factor by which the frequencies are finer than the records resolve.
+/// Frequency oversampling by zero-padding.
 const FINER: usize = 4;
-/// Frequencies on either side of a line that its power is compared with.
+/// Number of frequencies on either side of a line that its power is compared with.
 const AROUND: usize = 200;
-/// Resolved frequencies below the lowest line.
+/// Lowest line, in resolved frequencies.
 const LOWEST: f64 = 3.0;
 
-/// Highest lines in residuals up to a frequency, the power of all records averaged.
+/// Strongest lines in residuals up to a frequency, with the power averaged over all records.
 pub fn lines_of(residuals: &[RecordResidual], to_hz: f64, count: usize) -> Vec<SpectralLine> {
     let Some(longest) = residuals.iter().map(|r| r.samples.len()).max() else {
         return Vec::new();
@@ -181,7 +182,7 @@ pub fn lines_of(residuals: &[RecordResidual], to_hz: f64, count: usize) -> Vec<S
     lines
 }
 
-/// Mean squared amplitude of residuals at each frequency, with a Hann window, padded with zeros to `total` samples.
+/// Mean squared amplitude of residuals at each frequency, with a Hann window, zero-padded to `total` samples.
 fn padded_power(residuals: &[RecordResidual], total: usize) -> Vec<f64> {
     let plan = torqcomp_fourier::forward(total);
     let mut power = vec![0.0; total / 2 + 1];
@@ -203,7 +204,7 @@ fn padded_power(residuals: &[RecordResidual], total: usize) -> Vec<f64> {
     power
 }
 
-/// The line whose peak is nearest to a frequency; a parabola through three amplitudes refines its frequency.
+/// The line whose peak is nearest to a frequency, refined by parabolic interpolation of three amplitudes.
 fn line_at(power: &[f64], k: usize, step: f64) -> SpectralLine {
     let mut around = power[k - AROUND.min(k)..(k + AROUND).min(power.len())].to_vec();
     let middle = around.len() / 2;
@@ -222,7 +223,7 @@ mod tests {
     use super::*;
     use crate::diagnose::test_noise::noise;
 
-    /// An input of low frequencies with 0.5 % of white noise, and what answers that noise alone.
+    /// A low-frequency input with 0.5 % white noise, and a response to that noise alone.
     #[test]
     fn what_answers_noise_on_the_input_does_not_follow_from_it() {
         let mut random = noise(2);
@@ -234,10 +235,10 @@ mod tests {
         let input: Vec<f64> = noise.iter().enumerate().map(input).collect();
         let (share, significance) = coherent_share(&input, &noise, 1024, 0.0);
         assert!(share < 0.04, "{share}, {significance}");
-        // What answers the input itself still does.
+        // A response to the input itself still does.
         let (share, _) = coherent_share(&input, &input, 1024, 0.0);
         assert!(share > 0.9, "{share}");
-        // A model that never settles compares nothing with anything.
+        // A model that never settles has no segments to compare.
         assert!(coherent_share(&input, &input, 1024, f64::INFINITY).0.abs() < 1e-12);
     }
 }

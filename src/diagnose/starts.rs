@@ -1,4 +1,4 @@
-//! Where the fit of an effect starts: near the size that the residual suggests.
+//! Start values of the fit of an effect, near the magnitude suggested by the residual.
 
 use std::borrow::Cow;
 use std::f64::consts::TAU;
@@ -14,30 +14,31 @@ use super::structure::{EffectForm, Structure};
 use super::unexplained::raw_residual;
 use torqcomp_dsp::{dot, sort_by_number};
 
-/// Starts that are fitted.
+/// Number of starts that are fitted.
 const FITTED: usize = 2;
-/// Starts whose size is adjusted.
+/// Number of starts whose magnitude is adjusted.
 const SIZED: usize = 4;
-/// Smallest and largest factor on the size of a start.
+/// Limits of the factor on the magnitude of a start.
 const FACTORS: [f64; 2] = [1e-3, 4.0];
 
-/// A start with the training residual that it leaves, apart from what a change of the base's own parameters removes.
+/// A start with its training residual, apart from what a change of the base's own parameters removes.
 #[derive(Clone)]
 pub struct Start {
     /// Values of all parameters.
     pub values: Vec<f64>,
-    /// State of each training record at its start, where it is not that of the base.
+    /// Initial state of each training record, if it differs from that of the base.
     pub initial: Option<Vec<InitialState>>,
     /// Sum of squares of the residual.
     pub left: f64,
-    /// Reduction of the sum of squares with the best size of what the start adds, to first order.
+    /// Reduction of the sum of squares with the optimum magnitude of the added effect, to first
+    /// order.
     reduction: f64,
-    /// That size.
+    /// That magnitude, as a factor.
     factor: f64,
 }
 
 impl Start {
-    /// The training records with the states that the start has.
+    /// The training records with the initial states of the start.
     pub fn in_records<'r>(&self, training: &'r [StandRecord]) -> Cow<'r, [StandRecord]> {
         let Some(initial) = &self.initial else {
             return training.into();
@@ -48,7 +49,8 @@ impl Start {
     }
 }
 
-/// The starts that leave least: each as it is and with the size that the residual suggests.
+/// The starts with the smallest residuals: each as given and with the magnitude suggested by the
+/// residual.
 pub fn best_starts(
     base: &BaseModel,
     structure: &Structure,
@@ -92,7 +94,8 @@ pub fn best_starts(
     found
 }
 
-/// The start that frequency and decay of free ringing over its amplitude give, for the first effect of a plain stand.
+/// The start from the amplitude dependence of frequency and decay rate of a free decay, for the first effect of a
+/// plain stand.
 fn from_backbone(structure: &Structure, plain: &[f64], training: &[StandRecord]) -> Option<Start> {
     let [effect] = structure.effects.as_slice() else {
         return None;
@@ -120,7 +123,7 @@ fn from_backbone(structure: &Structure, plain: &[f64], training: &[StandRecord])
     })
 }
 
-/// Start values of an effect's own parameters; for a line also the frequencies that stand out of the residual.
+/// Start values of an effect's own parameters; for a line also the significant frequencies of the residual.
 fn own_values(effect: &EffectForm, lines: &[SpectralLine], scales: &RecordScales) -> Vec<Vec<f64>> {
     let mut all: Vec<Vec<f64>> = effect.form.starts.iter().map(|s| s.to_vec()).collect();
     if effect.is_line() {
@@ -133,8 +136,8 @@ fn own_values(effect: &EffectForm, lines: &[SpectralLine], scales: &RecordScales
     all
 }
 
-/// Reduces the stiffness of the plain stand by that of the effect, so that the whole is as stiff as before; `present` is the
-/// added stiffness of the effects that are there already.
+/// Reduces the stiffness of the plain stand by that of the effect, so that the total is unchanged; `present` is the
+/// added stiffness of the existing effects.
 fn with_shared_stiffness(structure: &Structure, present: f64, mut values: Vec<f64>) -> Vec<f64> {
     let factor = (1.0 + structure.model(&values).0.added_stiffness()) / (1.0 + present);
     values[0] /= factor.sqrt();
@@ -144,8 +147,8 @@ fn with_shared_stiffness(structure: &Structure, present: f64, mut values: Vec<f6
     values
 }
 
-/// What an effect with these own values, the last of a structure, changes in the training records beyond what the base's own
-/// parameters can; one record after the other. `None` if the motion diverges.
+/// Change of the training records by an effect with these own values, the last of a structure, that the base's own
+/// parameters cannot absorb; one record after the other. `None` if the motion diverges.
 pub fn change(
     base: &BaseModel,
     structure: &Structure,
@@ -168,7 +171,7 @@ pub fn change(
     Some(changes.collect::<Option<Vec<_>>>()?.concat())
 }
 
-/// What a model changes in a training record, by its number.
+/// Change of training record `k` by a model.
 fn change_of(base: &BaseModel, model: &Chain, record: &StandRecord, k: usize) -> Option<Vec<f64>> {
     // The constant load of the record is left to the fit.
     let unloaded = InitialState {

@@ -1,5 +1,5 @@
-//! Whether stand and measuring chain change over a record: constants that differ from segment to segment, and noise that
-//! follows the signal. Neither repeats with the input, so that differences between periods show both as noise.
+//! Tests whether stand and measuring chain change over a record: constants that differ between segments, and noise that
+//! follows the signal. Neither is periodic with the input, so differences between periods count both as noise.
 
 use std::f64::consts::TAU;
 use std::ops::{Range, RangeInclusive};
@@ -13,32 +13,32 @@ use super::residual_tests::{PowerShare, differences, without_mean};
 use super::spectra::spectra;
 use torqcomp_dsp::dot;
 
-/// Segments that a record is cut into: few for slow changes, many for fast ones.
+/// Numbers of segments of a record: few for slow changes, many for fast ones.
 const SEGMENTS: [usize; 3] = [12, 36, 108];
 /// Minimum number of segments.
 const FEWEST: usize = 8;
 /// Minimum length of a segment: samples, and time constants of the stand.
 const SHORTEST: [f64; 2] = [24.0, 3.0];
-/// Circular shifts of the residual against the record, whose results show what chance does.
+/// Circular shifts of the residual against the record, for the chance distribution.
 const SHIFTS: usize = 33;
-/// Each shift differs from the one before by the golden section of the range, which avoids periods.
+/// Successive shifts differ by the golden ratio of the range, which avoids periods.
 const GOLDEN: f64 = 0.618_033_988_749_895;
-/// Range of the shifts, as parts of the record.
+/// Range of the shifts, as fractions of the record.
 const SHIFT_RANGE: [f64; 2] = [0.1, 0.9];
-/// Lowest lines of a record's spectrum, where a drifting zero shows, and the lines above, which show what noise has there.
+/// Lowest lines of a record's spectrum, where zero drift shows, followed by the lines used to estimate the noise there.
 const LOWEST: RangeInclusive<usize> = 1..=12;
 const ABOVE: Range<usize> = 13..130;
-/// Corners of noise of first order that are tried, in lines: the lowest, the ratio of one to the next, and their number. With a
-/// lower one, the spectrum of a jump would pass for noise.
+/// Corner frequencies of first-order noise tried, in lines: the lowest, the ratio of successive ones, and their number.
+/// With a lower one, the spectrum of a jump would pass for noise.
 const CORNERS: (f64, f64, i32) = (10.0, 1.3, 12);
-/// Relative standard deviation of the level of that noise.
+/// Relative standard deviation of the estimated noise level.
 const LEVEL_STD: f64 = 0.3;
-/// Standard deviation of a normal law over its median absolute deviation.
+/// Ratio of standard deviation to median absolute deviation of the normal distribution.
 const STD_PER_MAD: f64 = 1.4826;
 
-/// The power that separate constants in each segment remove from a residual: natural frequency, damping ratio and gain, to
-/// first order, `r ≈ Σ_k a_k ∂y/∂p_k` with other `a_k` in each segment. A residual that does not follow from the
-/// motion loses as much when it is shifted against the record in time, whatever its colour.
+/// The power that separate constants in each segment remove from a residual: natural frequency, damping ratio and gain,
+/// to first order, `r ≈ Σ_k a_k ∂y/∂p_k` with different `a_k` in each segment. A residual that does not depend on the
+/// motion loses as much when shifted in time against the record, whatever its spectrum.
 pub fn changing_constants(residuals: &[RecordResidual], mode: &Mode) -> PowerShare {
     const OF: &str = "constants that change over the record";
     let records: Vec<(Vec<f64>, [Vec<f64>; 3])> = residuals
@@ -46,7 +46,7 @@ pub fn changing_constants(residuals: &[RecordResidual], mode: &Mode) -> PowerSha
         .map(|residual| {
             let slopes = slopes(&residual.modelled, mode, residual.record.rate_hz());
             let mut rest = residual.samples.clone();
-            // What other constants for the whole record remove does not change over it.
+            // What other constants for the whole record remove is not a change over it.
             let whole: Columns = slopes.iter().cloned().collect();
             whole.clear(&mut rest);
             (rest, slopes)
@@ -86,7 +86,7 @@ pub fn with_signal(residuals: &[RecordResidual]) -> PowerShare {
     with_square(OF, residuals, |r| r.modelled.clone())
 }
 
-/// The same with the slope of the modelled record, `r² ≈ a + b y'²`: sampling jitter `τ` leaves `r = y' τ`.
+/// The same with the slope of the modelled record, `r² ≈ a + b y'²`: sampling jitter `τ` causes `r = y' τ`.
 pub fn with_slope(residuals: &[RecordResidual]) -> PowerShare {
     const OF: &str = "the slope of the signal, as sampling jitter would cause";
     with_square(OF, residuals, |r| slope(&r.modelled))
@@ -98,7 +98,7 @@ fn slope(y: &[f64]) -> Vec<f64> {
     differences.map(|difference| 0.5 * difference).collect()
 }
 
-/// The power of the residuals proportional to the square of something, sample by sample.
+/// The power of the residuals proportional to the square of a series, sample by sample.
 fn with_square(
     of: &'static str,
     residuals: &[RecordResidual],
@@ -127,8 +127,8 @@ fn with_square(
     beyond_chance(of, &shares, residual_power)
 }
 
-/// The power at the lowest frequencies above that of the noise next to them: a zero that drifts or jumps. The mean is not
-/// part of it. Noise may rise towards them as that of first order does.
+/// The power at the lowest frequencies above that of the neighbouring noise: a zero that drifts or jumps. The mean is
+/// excluded. The noise may rise towards them like first-order noise.
 pub fn wandering_zero(residuals: &[RecordResidual]) -> PowerShare {
     const OF: &str = "a zero that drifts or jumps";
     let (mut excess, mut total, mut variance) = (0.0, 0.0, 0.0);
@@ -153,8 +153,8 @@ pub fn wandering_zero(residuals: &[RecordResidual]) -> PowerShare {
     }
 }
 
-/// Power of the noise at the lowest lines of a spectrum: `S = a/(1 + (f/f_c)²)`, of the greatest likelihood for the lines above
-/// (P. Whittle, Ark. Mat. 2 (1953), 423).
+/// Noise power at the lowest lines of a spectrum: `S = a/(1 + (f/f_c)²)`, by maximum likelihood for the lines above (P.
+/// Whittle, Ark. Mat. 2 (1953), 423).
 fn level_at_zero(spectrum: &[f64]) -> Option<f64> {
     let above = spectrum.get(ABOVE)?;
     let (lowest, ratio, count) = CORNERS;
@@ -204,7 +204,7 @@ fn beyond_chance(of: &'static str, sums: &[f64], total: f64) -> PowerShare {
     }
 }
 
-/// A residual shifted circularly against the record; not at all for shift 0.
+/// A residual shifted circularly against the record; unchanged for shift 0.
 fn shifted(values: &[f64], shift: usize) -> Vec<f64> {
     let [from, to] = SHIFT_RANGE;
     let part = from + (to - from) * (shift as f64 * GOLDEN).fract();
@@ -215,7 +215,7 @@ fn shifted(values: &[f64], shift: usize) -> Vec<f64> {
     in_a_circle(values, by)
 }
 
-/// Values shifted by so many in a circle.
+/// Values shifted circularly by `by`.
 pub(super) fn in_a_circle(values: &[f64], by: usize) -> Vec<f64> {
     [&values[by..], &values[..by]].concat()
 }
@@ -277,7 +277,7 @@ mod tests {
         }
     }
 
-    /// A record of 40 sines about the resonance that repeats every 2000 samples.
+    /// A record of 40 sines about the resonance, with a period of 2000 samples.
     fn record() -> Vec<f64> {
         let mut random = noise(5);
         let phases: Vec<f64> = (0..40).map(|_| TAU * random()).collect();
@@ -357,7 +357,7 @@ mod tests {
             .map(|(i, r)| r + if (3000..7000).contains(&i) { 0.5 } else { 0.0 })
             .collect();
         assert!(wandering_zero(&of(&quiet, &quiet)).share.abs() < 0.01);
-        // A variance of 1/12 beside 0.25 · (1/3 · 2/3).
+        // A variance of 1/12 in addition to 0.25 · (1/3 · 2/3).
         let found = wandering_zero(&of(&jumps, &jumps));
         assert!(
             (found.share - 0.4).abs() < 0.1 && found.significance > 10.0,
@@ -365,7 +365,7 @@ mod tests {
         );
     }
 
-    /// What makes a zero drift in [`ResidualTests`](super::super::residual_tests::ResidualTests).
+    /// Threshold of zero drift in [`ResidualTests`](super::super::residual_tests::ResidualTests).
     const NONE: f64 = 6.0;
 
     #[test]
@@ -386,7 +386,7 @@ mod tests {
 
     #[test]
     fn slopes_match_differences_of_two_records() {
-        // One line of 66 Hz, w = 1.1: H = 1/(1 − w² + 0.1 j w), changed by one part in 10⁵ of frequency or of ζ.
+        // One line at 66 Hz, w = 1.1: H = 1/(1 − w² + 0.1 j w), with frequency or ζ changed by one part in 10⁵.
         let at = |natural_hz: f64, zeta: f64| {
             let w = 66.0 / natural_hz;
             Complex64::new(1.0 - w * w, 2.0 * zeta * w).inv()

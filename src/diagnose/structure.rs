@@ -1,4 +1,4 @@
-//! A model with free parameters: the plain stand and the effects added to it.
+//! A model with free parameters: the plain stand and its added effects.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use crate::stand::derivative;
 pub struct PlainStand {
     pub natural_hz: f64,
     pub damping_ratio: f64,
-    /// Recorded per applied quantity at rest.
+    /// Static gain, recorded per applied quantity.
     pub gain: f64,
 }
 
@@ -32,30 +32,30 @@ impl PlainStand {
     }
 }
 
-/// Turns of a line in the longest record from which on it is looked for.
+/// Minimum number of periods of a line in the longest record.
 const FEWEST_TURNS: f64 = 3.0;
 
-/// What all models of a diagnosis share.
+/// Context shared by all models of a diagnosis.
 #[derive(Clone)]
 pub struct FitContext {
-    /// Scales that make the parameters pure numbers.
+    /// Scales that make the parameters dimensionless.
     pub scales: RecordScales,
-    /// The fitted plain stand: scale of natural frequency and gain, and the mode of the free motion in the residuals.
+    /// The fitted plain stand: scale of natural frequency and gain, and mode of the free motion in the residuals.
     pub plain: PlainStand,
     /// All modes of a stand that has several.
     pub several: Option<SeveralModes>,
     /// Whether the gain is a parameter of the plain stand.
     pub gain_is_free: bool,
-    /// What is recorded of the stand's motion.
+    /// Recorded quantity of the stand's motion.
     pub measures: Motion,
-    /// Whether it is known what torques in the stand do to the records.
+    /// Whether the response of the records to torques in the stand is known.
     pub sees_torques: bool,
-    /// The recorder, as declared in the stand file.
+    /// The recorder declared in the stand file.
     pub recorder: Option<Fixed>,
     pub units: ChannelUnits,
-    /// Of a body without a spring: what holds it.
+    /// The tying spring of a body without a spring.
     pub held: Option<HeldBody>,
-    /// Whether free motion from the start of a record is seen in it.
+    /// Whether free motion from the start of a record is visible in it.
     pub rings_at_start: bool,
 }
 
@@ -73,8 +73,8 @@ impl FitContext {
         }
     }
 
-    /// Whether an effect in that form is looked for: beside a spring that only holds a free body, not all mean something, and
-    /// a part of a turn of a line is a drift.
+    /// Whether an effect in that form is considered: with a spring that only ties a free body, not all are meaningful,
+    /// and a fraction of a period of a line is a drift.
     pub fn allows(&self, effect: &EffectForm) -> bool {
         let acts_at_gage = effect.form.stage == Stage::Stand;
         (self.held.is_none() || effect.needs_no_spring())
@@ -82,17 +82,17 @@ impl FitContext {
             && effect.most_turns(&self.scales) >= FEWEST_TURNS
     }
 
-    /// Number of constants that are moved in any fit.
+    /// Number of constants in every fit.
     pub fn constant_count(&self) -> usize {
         2 + usize::from(self.gain_is_free)
     }
 
-    /// Number of parameters of the plain stand, with those of further modes where a fit moves them.
+    /// Number of parameters of the plain stand, including further modes if they are fitted.
     pub fn plain_count(&self) -> usize {
         self.constant_count() + self.several.as_ref().map_or(0, SeveralModes::count)
     }
 
-    /// The same with all modes to be fitted.
+    /// The same with all modes free.
     pub fn with_modes_free(&self) -> Self {
         let mut free = self.clone();
         if let Some(several) = &mut free.several {
@@ -101,7 +101,7 @@ impl FitContext {
         free
     }
 
-    /// Modes that swing freely from the start of a record, beside that of the plain stand.
+    /// Modes with free motion from the start of a record, other than that of the plain stand.
     pub fn terms(&self) -> NuisanceTerms {
         let further = self.several.iter().flat_map(SeveralModes::further);
         NuisanceTerms {
@@ -163,7 +163,7 @@ impl EffectForm {
         effects.into_iter().flat_map(forms).collect()
     }
 
-    /// Number of parameters that a fit moves: amplitudes of lines follow from the data by least squares.
+    /// Number of parameters that a fit moves; amplitudes of lines follow by linear least squares.
     pub fn moved(&self) -> usize {
         if self.is_line() {
             1
@@ -172,14 +172,14 @@ impl EffectForm {
         }
     }
 
-    /// The parameter that says how much of it there is: the first that may be zero.
+    /// Index of the parameter that measures its magnitude: the first that may be zero.
     pub fn size(&self) -> Option<usize> {
         let parameters = self.form.parameters.iter().take(self.moved());
         let mut sizes = parameters.map(|p| p.lower <= 0.0 && p.upper >= 0.0);
         sizes.position(|is_size| is_size && !self.is_line())
     }
 
-    /// Most turns of its line in a record; any number where it has none.
+    /// Maximum number of periods of its line in a record; unlimited for an effect without a line.
     fn most_turns(&self, scales: &RecordScales) -> f64 {
         match self.form.parameters.first() {
             Some(hz) if self.is_line() => hz.upper * hz.size(scales) * scales.duration_s,
@@ -187,26 +187,26 @@ impl EffectForm {
         }
     }
 
-    /// Whether it adds what does not come from the input: it may be in one record and not in another.
+    /// Whether it adds a signal independent of the input, which may differ between records.
     pub fn is_disturbance(&self) -> bool {
         self.form.stage == Stage::Disturbance
     }
 
-    /// Whether it adds lines: its parameters are a frequency, then amplitudes.
+    /// Whether it adds lines: its parameters are a frequency, followed by amplitudes.
     pub fn is_line(&self) -> bool {
         let first = self.form.parameters.first();
         first.is_some_and(|p| p.unit == Unit::Hertz) && self.is_disturbance()
     }
 }
 
-/// A model with free parameters, all pure numbers: natural frequency, damping ratio, gain if free, then those of the
-/// effects.
+/// A model with free parameters, all dimensionless: natural frequency, damping ratio, gain if free, then those of
+/// the effects.
 #[derive(Clone)]
 pub struct Structure {
     pub context: Arc<FitContext>,
-    /// Those that the stand file declares come first.
+    /// Those declared in the stand file come first.
     pub effects: Vec<EffectForm>,
-    /// Number of effects that the stand file declares.
+    /// Number of effects declared in the stand file.
     pub declared: usize,
 }
 
@@ -223,7 +223,7 @@ impl Structure {
         }
     }
 
-    /// The effects that were added to those of the stand file.
+    /// The effects added to those of the stand file.
     pub fn added(&self) -> &[EffectForm] {
         &self.effects[self.declared..]
     }
@@ -251,7 +251,7 @@ impl Structure {
         structure
     }
 
-    /// The same with some of its effects, by their numbers, and their part of parameter values.
+    /// The same with a selection of its effects, by index, and the corresponding parameter values.
     pub fn reduced(&self, values: &[f64], keeps: impl Fn(usize) -> bool) -> (Self, Vec<f64>) {
         let (plain, mut rest) = values.split_at(self.context.plain_count());
         let mut kept = plain.to_vec();
@@ -268,7 +268,7 @@ impl Structure {
         (reduced, kept)
     }
 
-    /// Lower and upper bound of each parameter that a fit moves.
+    /// Lower and upper bound of each fit parameter.
     pub fn bounds(&self) -> Vec<[f64; 2]> {
         let context = &self.context;
         let mut all = PLAIN_BOUNDS[..context.constant_count()].to_vec();
@@ -280,7 +280,7 @@ impl Structure {
         all
     }
 
-    /// Mode and gain of parameter values.
+    /// Mode and gain for parameter values.
     pub fn mode(&self, values: &[f64]) -> (Mode, f64) {
         let mode = Mode {
             omega_rad_s: TAU * self.context.scales.natural_hz * values[0],
@@ -293,12 +293,12 @@ impl Structure {
         (mode, gain)
     }
 
-    /// The values of further modes, where a fit moves them.
+    /// The values of further modes, if they are fitted.
     fn values_of_modes<'a>(&self, values: &'a [f64]) -> &'a [f64] {
         &values[self.context.constant_count()..self.context.plain_count()]
     }
 
-    /// The plain stand of parameter values.
+    /// The plain stand for parameter values.
     pub fn stand(&self, values: &[f64]) -> PlainStand {
         let (mode, gain) = self.mode(values);
         PlainStand {
@@ -324,7 +324,7 @@ impl Structure {
         self.effects.iter().map(of_effect).collect()
     }
 
-    /// The model of parameter values, and what it adds that belongs to a record.
+    /// The model for parameter values, and its nuisance terms.
     pub fn model(&self, values: &[f64]) -> (Chain, NuisanceTerms) {
         let (mode, gain) = self.mode(values);
         let response = match &self.context.several {
@@ -333,7 +333,7 @@ impl Structure {
         };
         let mut terms = self.context.terms();
         if self.context.rings_at_start {
-            // What rings tells the frequencies of all modes.
+            // The free decay shows the frequencies of all modes.
             let further = response.parts().iter().skip(1);
             terms.modes = further.map(|part| part.mode).collect();
         }

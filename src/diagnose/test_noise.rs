@@ -1,4 +1,4 @@
-//! Noise for the tests of the diagnosis, the same on every run.
+//! Reproducible noise for the tests of the diagnosis.
 
 /// Reproducible pseudo-random numbers in [−0.5, 0.5] (linear congruential).
 pub fn noise(seed: u64) -> impl FnMut() -> f64 {

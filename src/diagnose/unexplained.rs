@@ -1,4 +1,4 @@
-//! What a model leaves of the records, as the residuals of a fit.
+//! Residuals of a model as the objective of a fit.
 
 use torqcomp_model::fit::{FitError, Residuals};
 use torqcomp_model::{Chain, Mode, StandRun};
@@ -8,14 +8,14 @@ use super::record::{Nuisance, NuisanceTerms, StandRecord};
 use super::several_modes::{ModeSlopes, SeveralModes};
 use super::structure::Structure;
 
-/// What a structure leaves of the records, what belongs to these taken out.
+/// Residuals of a structure on the records, without nuisance terms.
 pub struct Unexplained<'a> {
     structure: &'a Structure,
     records: &'a [StandRecord],
     of_records: &'a OwnOfRecords,
-    /// The nuisance terms of each record in the mode of its free motion, where that of the parameters is not taken.
+    /// The nuisance terms of each record in the fixed mode of its free motion, if not in that of the parameters.
     fixed: Option<Vec<Nuisance>>,
-    /// What modes that the fit does not move change of all residuals.
+    /// Derivatives of all residuals with respect to modes that the fit does not move.
     modes: Option<ModeSlopes>,
 }
 
@@ -33,7 +33,8 @@ impl<'a> Unexplained<'a> {
             fixed: None,
             modes: None,
         };
-        // But for lines, drift and what decays, the nuisance terms depend on the parameters by their mode alone.
+        // Except for lines, drift and decays, the nuisance terms depend on the parameters through their mode
+        // alone.
         problem.fixed = free.map(|free| {
             let terms = structure.model(start).1.lasting();
             let of = |(k, r): (usize, &StandRecord)| problem.nuisance(k, r, free, &terms);
@@ -71,15 +72,16 @@ impl Residuals for Unexplained<'_> {
 }
 
 impl Unexplained<'_> {
-    /// The modes that leave least of the residuals, and whether they leave so much less that they are worth another fit; `None` if
-    /// there are none that the fit does not move, or the motion diverges.
+    /// The modes that minimise the residuals, and whether the improvement is worth another fit; `None` if all modes are
+    /// moved by the fit, or the motion diverges.
     pub fn corrected_modes(&self, values: &[f64]) -> Option<(SeveralModes, bool)> {
         let modes = self.modes.as_ref()?;
         let residuals = self.of_all_records(&[values.to_vec()], false).pop()?;
         Some(modes.modes(&mut residuals.ok()?))
     }
 
-    /// The residuals of all records, with or without what other modes would take out of them.
+    /// The residuals of all records, with or without removing what a change of other modes would
+    /// explain.
     fn of_all_records(
         &self,
         points: &[Vec<f64>],
@@ -103,7 +105,7 @@ impl Unexplained<'_> {
         each.collect()
     }
 
-    /// What models leave of a record, by its number, each with values of what belongs to the records.
+    /// Residuals of models on record `k`, each with its own values of the record's parameters.
     fn of_record(
         &self,
         k: usize,
@@ -118,7 +120,7 @@ impl Unexplained<'_> {
             .map(|(((chain, _), _), record)| record.run_of(chain))
             .collect();
         let mut residuals = raw_residuals(&runs, &self.records[k]);
-        // Most of the models differ in nothing that moves these.
+        // Most of the models do not differ in the parameters that affect these.
         let mut last: Option<(&NuisanceTerms, Nuisance)> = None;
         for (residual, (((chain, terms), _), record)) in residuals.iter_mut().zip(both()) {
             let Ok(residual) = residual else { continue };
@@ -136,13 +138,13 @@ impl Unexplained<'_> {
     }
 }
 
-/// Measured less modelled over the range of a record, nuisance terms included.
+/// Measured minus modelled record over its range, including nuisance terms.
 pub fn raw_residual(model: &Chain, record: &StandRecord) -> Result<Vec<f64>, FitError> {
     let residual = raw_residuals(&[record.run_of(model)], record).into_iter();
     residual.last().expect("one for the model")
 }
 
-/// The same of several models.
+/// The same for several models.
 pub fn raw_residuals(runs: &[StandRun], record: &StandRecord) -> Vec<Result<Vec<f64>, FitError>> {
     let residual = |modelled: Vec<f64>| {
         let pairs = record.measured_in_range().iter();

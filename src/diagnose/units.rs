@@ -8,13 +8,13 @@ pub struct ChannelUnits {
     pub applied: String,
     /// Of the measured quantity, in the files; empty if unknown.
     pub measured: String,
-    /// Of the measured quantity as it is diagnosed: torque, or the SI unit.
+    /// Of the measured quantity in the diagnosis: torque, or the SI unit.
     pub diagnosed: String,
     /// Whether applied and measured quantity are torques, the latter after calibration.
     pub is_torque: bool,
     /// Diagnosed units per printed unit.
     pub per_printed: f64,
-    /// SI units per unit of the files, applied and measured.
+    /// SI units per file unit, applied and measured.
     pub factors: [f64; 2],
 }
 
@@ -27,7 +27,7 @@ impl ChannelUnits {
         }
     }
 
-    /// Unit of the static gain as it is printed, and printed units per SI unit.
+    /// Unit of the printed static gain, and printed units per SI unit.
     pub fn gain(&self) -> (String, f64) {
         let [applied, measured] = self.factors;
         let unit = match (self.measured.as_str(), self.applied.as_str()) {

@@ -1,4 +1,4 @@
-//! Verdict: whether something is missing, and which effects stand.
+//! Verdict: whether something is missing, and which effects are accepted.
 
 use torqcomp_model::effects::Stage;
 
@@ -36,37 +36,40 @@ impl Verdict {
     }
 }
 
-/// Error over the noise floor up to which nothing needs to be missing.
+/// Ratio of the error to the noise floor up to which nothing need be missing.
 const AT_FLOOR: f64 = 1.1;
-/// Error over a floor from out of band above which no colour of the noise accounts for it.
+/// Ratio of the error to an out-of-band floor above which coloured noise cannot explain it.
 const FAR_ABOVE: f64 = 1.5;
-/// The same up to which it may be coloured noise, if nothing else speaks against that: noise of first order with a correlation of
-/// 0.9 from one sample to the next is at four times the floor of white noise.
+/// Ratio up to which it may be coloured noise, if nothing else contradicts that: first-order noise with a correlation
+/// of 0.9 between samples is at four times the floor of white noise.
 const MOST_COLOURED: f64 = 8.0;
-/// Minimum part of the excess error power that an effect must explain to be named.
+/// Minimum fraction of the excess error power that a named effect must explain.
 const NAMED: f64 = 0.5;
-/// Error over a noise floor from periods from which on that part is known well enough to require it.
+/// Ratio of the error to a noise floor from periods above which that fraction is known well enough
+/// to require it.
 const CLEARLY_ABOVE: f64 = 1.05;
-/// Error over the noise floor above which a remaining dependence on the input counts.
+/// Ratio of the error to the noise floor above which a remaining dependence on the input counts.
 const ABOVE: f64 = 1.005;
-/// Standard uncertainties of the constants within which their error lies in 95 % of all cases.
+/// 95 % coverage factor for the error due to uncertain constants.
 const CERTAIN: f64 = 2.0;
-/// Minimum part of the initial excess error power that a further effect must explain to be named.
+/// Minimum fraction of the initial excess error power that a further named effect must explain.
 const SECOND: f64 = 0.02;
-/// The same for one that explains more than half of what is left above the noise.
+/// The same for one that explains more than half of the remainder above the noise.
 const SECOND_OF_REST: f64 = 0.01;
 const MOST_OF_REST: f64 = 0.5;
-/// Error power, in that of the noise, from which on a further effect is named however little of the initial excess it explains,
-/// if it explains this part of what is left: beside an effect that describes its cause exactly, little may be left of much.
+/// Error power, relative to the noise, above which a further effect is named however little of the initial excess it
+/// explains, if it explains this fraction of the remainder: after an effect that describes its cause exactly, the
+/// remainder may be a small part of a large excess.
 const FAR_ABOVE_NOISE: f64 = 10.0;
 const GREAT_PART_OF_REST: f64 = 1.0 / 3.0;
-/// What takes this part of what is left above the noise, where that is measurable, is named however little of the initial excess it
-/// is: what imitates the rest of another law leaves more. The noise floor errs by some per cent.
+/// An effect that explains this fraction of a measurable remainder above the noise is named however little of the
+/// initial excess it is: one that imitates the remainder of another law leaves more. The noise floor has an error of
+/// some per cent.
 const NEARLY_ALL_OF_REST: f64 = 0.65;
-/// Error power above the noise, in that of the noise, from which on it is measurable.
+/// Minimum measurable error power above the noise, relative to the noise.
 const MEASURABLE: f64 = 0.1;
 
-/// What the plain stand leaves, and the noise in it.
+/// Excess error of the plain stand, and the noise in it.
 #[derive(Clone, Copy)]
 pub struct PlainExcess<'a> {
     pub before: &'a ScoredModel,
@@ -74,19 +77,19 @@ pub struct PlainExcess<'a> {
 }
 
 impl PlainExcess<'_> {
-    /// Part of the plain stand's excess error power by which one model is better than another.
+    /// Fraction of the plain stand's excess error power by which one model is better than another.
     fn share(&self, from: &ScoredModel, to: &ScoredModel) -> f64 {
         let excess = self.before.excess_power(noise_rms(self.noise_floor));
         (from.compared_rms().powi(2) - to.compared_rms().powi(2)) / excess.max(1e-300)
     }
 
-    /// Part of it that a model explains.
+    /// Fraction of it explained by a model.
     fn explained(&self, after: &ScoredModel) -> f64 {
         self.share(self.before, after)
     }
 
-    /// Whether a further effect is not named although it passes, as it explains little of the whole and of what is left: what
-    /// no model describes exactly resembles many effects a little.
+    /// Whether a further effect is not named although it passes, as it explains little of the whole and of the
+    /// remainder: what no model describes exactly resembles many effects a little.
     pub fn is_too_small(&self, after: &ScoredModel, next: &ScoredModel) -> bool {
         let left = after.excess_power(noise_rms(self.noise_floor));
         let gain = after.compared_rms().powi(2) - next.compared_rms().powi(2);
@@ -106,8 +109,8 @@ impl PlainExcess<'_> {
         self.share(after, next) < least
     }
 
-    /// Whether further effects of stand or gage take nearly all of what a model leaves measurably above the noise. A slow course takes a
-    /// little of everything.
+    /// Whether further effects of stand or gage explain nearly all of the measurable remainder above the noise. A slow
+    /// trend explains a little of everything.
     pub fn is_nearly_taken(&self, after: &ScoredModel, next: &ScoredModel) -> bool {
         let left = after.excess_power(noise_rms(self.noise_floor));
         let gain = after.compared_rms().powi(2) - next.compared_rms().powi(2);
@@ -129,7 +132,7 @@ impl PlainExcess<'_> {
     }
 }
 
-/// Half-width of the resonance, in its damping, in which noise has lines.
+/// Half-width of the resonance, in half-bandwidths, within which noise has lines.
 const RESONANCE: f64 = 10.0;
 
 /// Whether the error is measurably above a noise floor.
@@ -138,24 +141,24 @@ pub fn is_above(model: &ScoredModel, floor: Option<NoiseFloor>) -> bool {
 }
 
 impl ScoredModel {
-    /// Noise, and what the constants leave uncertain beside it with 95 % certainty: no more than the noise, or constants that are
-    /// not known would excuse everything.
+    /// Noise combined with the 95 % uncertainty due to the constants, which is limited to the noise, as otherwise
+    /// unknown constants would excuse everything.
     fn with_uncertain(&self, noise_rms: f64) -> f64 {
         noise_rms.hypot((CERTAIN * self.uncertain_rms).min(noise_rms))
     }
 }
 
-/// The noise as far as it is known.
+/// The known noise.
 pub fn noise_rms(floor: Option<NoiseFloor>) -> f64 {
     floor.map_or(0.0, |f| f.rms)
 }
 
-/// Whether something above the noise is left. A noise level from differences of periods decides alone; one from out of
-/// band may be too low for coloured noise, so that the residual must also follow from input or motion, or be far above
+/// Whether something above the noise is left. A noise level from differences between periods decides alone; one from
+/// out of band may be too low for coloured noise, so the residual must also depend on input or motion, or be far above
 /// it.
 pub fn remains(model: &ScoredModel, tests: &ResidualTests, floor: Option<NoiseFloor>) -> bool {
     if tests.has_spikes() {
-        // Spikes also raise a floor that is measured without a model.
+        // Spikes also raise a floor measured without a model.
         return true;
     }
     let is_dependent = tests.dependence().is_some();
@@ -171,16 +174,17 @@ pub fn remains(model: &ScoredModel, tests: &ResidualTests, floor: Option<NoiseFl
 }
 
 impl SearchState {
-    /// Whether something is left, above the noise or hidden in it. Changes over a record also raise a floor that is taken
-    /// from differences of its periods. They are no reason to look for a second effect: none of the list causes them.
+    /// Whether something is left, above the noise or hidden in it. Changes over a record also raise a floor from
+    /// differences between its periods. They are no reason to look for a second effect, as no effect of the list causes
+    /// them.
     fn leaves(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
         let is_above = remains(model, tests, self.noise_floor);
         is_above && !self.is_coloured_noise(model, tests) || tests.nonstationary().is_some()
     }
 
-    /// Whether what the plain stand leaves is above the noise floor only because that is the one of white noise: no test sees a
-    /// dependence on input or motion, and no effect explains a significant part of the training residual. Beside an effect,
-    /// what is left of it would look the same, and so would torques that were not looked for.
+    /// Whether the residual of the plain stand exceeds the noise floor only because that assumes white noise: no test
+    /// detects a dependence on input or motion, and no effect explains a significant part of the training residual.
+    /// With an effect, its own remainder would look the same, and so would torques that were not looked for.
     pub(super) fn is_coloured_noise(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
         let error = model.compared_rms();
         let may_be = |floor: NoiseFloor| {
@@ -199,7 +203,8 @@ impl SearchState {
         round.is_some_and(|round| !round.iter().any(CandidateFit::is_confirmed))
     }
 
-    /// Whether a line is left beside the effects, above the noise and away from the resonance, in which noise has some of its own.
+    /// Whether a line is left besides the effects, above the noise and away from the resonance, in which noise has
+    /// lines of its own.
     fn leaves_line(&self) -> bool {
         if !is_above(&self.after, self.noise_floor) {
             return false;
@@ -212,14 +217,15 @@ impl SearchState {
         lines.iter().any(is_away)
     }
 
-    /// Whether nothing but white noise is left.
+    /// Whether only white noise is left.
     pub(super) fn is_at_noise(&self) -> bool {
         let is_white = self.tests.white && !self.tests.follows_anything();
         let is_at = |f: NoiseFloor| self.after.compared_rms() <= AT_FLOOR * f.rms;
         is_white && self.noise_floor.is_some_and(is_at)
     }
 
-    /// Whether the residual after is above the noise, coloured, and depends on the input, small as it may be.
+    /// Whether the final residual is above the noise, autocorrelated, and depends on the input, however
+    /// little.
     fn follows_input(&self) -> bool {
         let error = self.after.compared_rms();
         let is_above = |f: NoiseFloor| error > ABOVE * self.after.with_uncertain(f.rms);

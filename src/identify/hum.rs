@@ -1,4 +1,4 @@
-//! Lines of the mains in records of free ringing and of hits.
+//! Mains lines in records of free decays and hits.
 
 use std::borrow::Cow;
 
@@ -8,23 +8,23 @@ use torqcomp_dsp::quality::mains::mains;
 use super::Identification;
 use crate::print::rounded;
 
-/// A steady line beside what rings.
+/// A steady line in addition to the decay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SteadyLine {
     pub frequency_hz: f64,
-    /// Amplitude where it is largest.
+    /// Largest amplitude over the segments.
     pub amplitude: f64,
-    /// Whether it lies where lines of the mains do.
+    /// Whether its frequency is that of a mains line.
     pub is_of_mains: bool,
 }
 
-/// How far the mains may be off their nominal frequency, over it.
+/// Relative tolerance of the mains frequency.
 const OFF: f64 = 0.006;
-/// Steps in which the half of a record moves from its beginning to its end.
+/// Number of steps in which the half-length window moves from the beginning of a record to its end.
 const HALVES: usize = 3;
 
-/// A uniformly sampled record without the lines of the mains that stand out of it, which would hide where a decay begins
-/// and ends; and these lines. Without any, or in a record too short to tell them, it is unchanged.
+/// A uniformly sampled record without significant mains lines, which would hide where a decay begins and ends, and
+/// these lines. Unchanged if there are none, or the record is too short to detect them.
 pub(super) fn without_mains(
     values: &[f64],
     rate_hz: Option<f64>,
@@ -34,7 +34,7 @@ pub(super) fn without_mains(
         return (values.into(), Vec::new());
     };
     let orders: Vec<f64> = mains.lines.iter().map(|line| line.order as f64).collect();
-    // A decay leaks into the lines: they are taken from the half of the record where least else happens.
+    // A decay leaks into the lines, so they are estimated from the quietest half of the record.
     let half = values.len() / 2;
     let of_half = |start: usize| {
         let part = &values[start..start + half];
@@ -65,14 +65,14 @@ pub(super) fn without_mains(
     (left.into(), lines.collect())
 }
 
-/// The lines in words, each once.
+/// The lines as text, without duplicates.
 pub(super) fn listed(lines: &[SteadyLine]) -> String {
     let each = |line: &SteadyLine| {
         let [frequency, amplitude] =
             [(line.frequency_hz, 5), (line.amplitude, 2)].map(|(v, digits)| rounded(v, digits));
         format!("{frequency} Hz (amplitude {amplitude})")
     };
-    // What is left of a line after the first fit is the same line.
+    // The remainder of a line after the first fit is the same line.
     let is_same = |a: &SteadyLine, b: &SteadyLine| (a.frequency_hz - b.frequency_hz).abs() < 0.5;
     let first = |(i, line): &(usize, &SteadyLine)| !lines[..*i].iter().any(|l| is_same(l, line));
     let different = lines.iter().enumerate().filter(first);
@@ -80,7 +80,7 @@ pub(super) fn listed(lines: &[SteadyLine]) -> String {
     each.join(", ")
 }
 
-/// Warns about lines that were taken off.
+/// Warns about removed lines.
 pub(super) fn taken_off(result: &mut Identification, lines: &[SteadyLine]) {
     let (of_mains, others): (Vec<SteadyLine>, Vec<SteadyLine>) =
         lines.iter().partition(|line| line.is_of_mains);

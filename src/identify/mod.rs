@@ -1,4 +1,4 @@
-//! Constants of a stand from records of it: signals from `dsp`, fits from `model`, joined here.
+//! Constants of a stand from its records, with signal processing from `dsp` and fits from `model`.
 
 pub mod decay;
 mod hum;
@@ -56,13 +56,13 @@ impl NamedEstimate {
         }
     }
 
-    /// The value, in the constant's unit.
+    /// Value in the constant's unit.
     #[must_use]
     pub fn value(&self) -> f64 {
         self.estimate.value()
     }
 
-    /// The standard uncertainty; `None` if the data do not determine it.
+    /// Standard uncertainty; `None` if not identifiable from the data.
     #[must_use]
     pub fn std(&self) -> Option<f64> {
         self.estimate.std_uncertainty()
@@ -104,7 +104,8 @@ impl NamedEstimates {
         }
     }
 
-    /// Those with these names, in this order, of the mode `place` out of `count`, which numbers them if there are several.
+    /// Those with these names, in this order, for mode `place` of `count`; the names are numbered if there are several
+    /// modes.
     pub(crate) fn of_mode(mut self, (place, count): (usize, usize), names: &[&str]) -> Self {
         let prefix = match count {
             1 => String::new(),
@@ -121,7 +122,7 @@ impl NamedEstimates {
         self
     }
 
-    /// Correlation coefficient of two of them, by place.
+    /// Correlation coefficient of two of them, by index.
     pub(crate) fn correlation(&self, i: usize, j: usize) -> Option<f64> {
         self.covariance.correlation(i, j)
     }
@@ -183,7 +184,7 @@ fn correlations(names: &[&str], covariance: &Covariance) -> Vec<Correlation> {
     pairs.filter_map(strong).collect()
 }
 
-/// Numbers of a mode among several, in stand files and reports.
+/// Names of the numbers of one of several modes, in stand files and reports.
 pub(crate) const MODE_NUMBERS: [&str; 4] = [
     "natural_frequency",
     "damping_ratio",
@@ -191,12 +192,13 @@ pub(crate) const MODE_NUMBERS: [&str; 4] = [
     "quadrature",
 ];
 
-/// What each mode has in the response of a stand, as a stand file takes it.
+/// Contribution of each mode to the response of a stand, in the form of a stand file.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ModalShares {
     /// [`MODE_NUMBERS`] of each mode.
     pub modes: Vec<NamedEstimates>,
-    /// Measured per applied quantity at rest; of the displacement, if a derivative was measured.
+    /// Static gain, measured per applied quantity; that of the displacement, if a derivative was
+    /// measured.
     pub gain: Estimate,
 }
 
@@ -265,13 +267,13 @@ impl Identification {
         self.warnings.push(Warning::new(code, message));
     }
 
-    /// Adds constants, and which of them are strongly correlated.
+    /// Adds constants and their strong correlations.
     pub(crate) fn add(&mut self, constants: NamedEstimates) {
         self.correlations.extend(constants.correlations());
         self.parameters.extend(constants.list);
     }
 
-    /// Adds a unit to the axes of charts that have this label.
+    /// Adds a unit to the axes of charts with this label.
     pub(crate) fn label_charts(&mut self, label: &str, unit: &str) {
         let unit = match unit {
             "" => "unit not given",

@@ -1,4 +1,4 @@
-//! A mode of vibration as identified from records, and the constants of a stand that follow from it.
+//! A mode of vibration identified from records, and the constants of a stand derived from it.
 //!
 //! ```text
 //! ω_n = √(σ² + ω²),   ζ = σ/ω_n                                               (C7) to (C14)
@@ -6,16 +6,16 @@
 //! ```
 //!
 //! σ in 1/s and ω in rad/s are decay rate and damped angular frequency; J in kg m², f in N m s/rad, K in N m/rad. A
-//! decay, and torque in over torque out, determine only these ratios: all torques may be multiplied by one number
-//! without changing them. Motion over torque determines all three:
+//! decay, and output torque over input torque, determine only these ratios, as scaling all torques does not change
+//! them. Motion over torque determines all three:
 //!
 //! ```text
 //! θ/T = 1/(J s² + f s + K) = R/(s − p) + R*/(s − p*),   p = −σ + jω,   R = −j/(2 ω J)
 //! J = 1/g,   f = 2σ/g,   K = ω_n²/g,   g = −2 ω Im R
 //! ```
 //!
-//! R in rad/(N m s) is imaginary in a stand with J θ'' + f θ' + K θ = T; a real part shows that something lies between
-//! the torque and the motion.
+//! R in rad/(N m s) is imaginary for a stand with J θ'' + f θ' + K θ = T; a real part shows additional dynamics
+//! between torque and motion.
 
 use std::f64::consts::TAU;
 
@@ -34,7 +34,7 @@ pub struct Pole {
 }
 
 impl Pole {
-    /// From σ and ω, one pair for each mode.
+    /// From σ and ω, one pair per mode.
     pub(super) fn all(numbers: &[f64]) -> Vec<Self> {
         let pole = |pair: &[f64]| Self {
             rate_per_s: pair[0],
@@ -61,7 +61,7 @@ pub struct ModalPole {
     numbers: Estimates,
 }
 
-/// A constant known from elsewhere, with its standard uncertainty.
+/// A known constant with its standard uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum KnownConstant {
     /// J in kg m².
@@ -83,7 +83,8 @@ impl KnownConstant {
     }
 }
 
-/// Real part of the residue that is significant: in standard deviations, and over its imaginary part.
+/// Minimum significant real part of the residue: in standard deviations, and relative to its
+/// imaginary part.
 const TURNED: (f64, f64) = (3.0, 0.03);
 
 /// Name and unit of each constant of a stand.
@@ -91,10 +92,10 @@ const INERTIA: (&str, &str) = ("inertia", "kg m^2");
 const DAMPING: (&str, &str) = ("damping", "N m s/rad");
 const STIFFNESS: (&str, &str) = ("stiffness", "N m/rad");
 
-/// Name and unit, value, and gradient by the numbers that it follows from.
+/// Name and unit, value, and gradient with respect to the numbers that it follows from.
 type Row<const N: usize> = ((&'static str, &'static str), f64, [f64; N]);
 
-/// The covariance of `count` numbers, or none for any of them if one has none.
+/// The covariance of `count` numbers, or of none if one of them has none.
 pub(super) fn all_or_none(covariance: Covariance, count: usize) -> Covariance {
     match (0..count).all(|i| covariance.std(i).is_some()) {
         true => covariance,
@@ -102,7 +103,7 @@ pub(super) fn all_or_none(covariance: Covariance, count: usize) -> Covariance {
     }
 }
 
-/// Constants that follow from other numbers.
+/// Constants derived from other numbers.
 fn derived<const N: usize>(from: &Estimates, rows: &[Row<N>]) -> NamedEstimates {
     let names: Vec<_> = rows.iter().map(|row| row.0).collect();
     let gradients: Vec<_> = rows.iter().map(|row| row.2).collect();
@@ -146,7 +147,7 @@ impl ModalPole {
         Estimates::new(values, self.numbers.covariance().select(&[0, 1]))
     }
 
-    /// The same for constants that depend on both.
+    /// The same for constants that depend on both; without covariance if one is unknown.
     fn known_pole(&self) -> Estimates {
         let pole = self.pole_numbers();
         let covariance = all_or_none(pole.covariance().clone(), 2);
@@ -225,8 +226,8 @@ impl ModalPole {
         (s, w, s.powi(2) + w.powi(2))
     }
 
-    /// The known constant and the two others that follow from it and the mode. Where it is the least certain number,
-    /// all three are correlated.
+    /// The known constant and the two others derived from it and the mode. If it is the least certain number, all
+    /// three are correlated.
     ///
     /// ```
     /// use torqcomp::identify::{KnownConstant, ModalPole, Pole};
@@ -257,14 +258,14 @@ impl ModalPole {
                 ]
             }
         };
-        // Without an uncertainty of its own the known constant counts as exact.
+        // Without an uncertainty the known constant counts as exact.
         let std = known.std().unwrap_or(0.0);
         let all = self.known_pole().and(known.value(), Some(std));
         derived(&all, &rows)
     }
 
-    /// The same with the motion in rad (or rad/s, …) and the torque in N m; one unit of the response is
-    /// `rad_per_n_m`.
+    /// The same with the motion in rad (or rad/s, …) and the torque in N m; `rad_per_n_m` is the unit
+    /// of the response.
     #[must_use]
     pub fn scaled(&self, rad_per_n_m: f64) -> Self {
         let values = self.numbers.values();
@@ -351,7 +352,7 @@ mod tests {
         ModalPole::new(pole, Covariance::new(Some(&COVARIANCE), 2))
     }
 
-    /// Slopes against differences of the values.
+    /// Gradients against finite differences of the values.
     #[test]
     fn uncertainties_are_those_of_small_changes() {
         for known in [
@@ -388,7 +389,7 @@ mod tests {
 
     #[test]
     fn constants_are_correlated_with_an_uncertain_known_one() {
-        // 2 % of the known constant against 0.1 % of the square of ω.
+        // 2 % of the known constant against 0.1 % of ω².
         let pairs = |std| {
             let known = KnownConstant::Inertia(0.5, std);
             mode(POLE).scaled_by_known_constant(known).correlations()
@@ -425,7 +426,7 @@ mod tests {
             let name = &number.name;
             assert!((got / want - 1.0).abs() < 1e-6, "{name}: {got} {want}");
         }
-        // A stand ten times as soft and light.
+        // A stand with a tenth of the stiffness and inertia.
         let softer = mode.scaled(10.0).stand_constants().unwrap().list;
         assert!((softer[2].value() / found[2].value() - 0.1).abs() < 1e-12);
         assert!((softer[2].std().unwrap() / found[2].std().unwrap() - 0.1).abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! Quantity of a channel that records a motion.
+//! Kind of motion recorded by a channel.
 
 use clap::ValueEnum;
 use torqcomp_model::Dimension;
@@ -16,17 +16,17 @@ pub enum Motion {
     Acceleration,
 }
 
-/// What to write for a channel in `g`, if the unit is that.
+/// Hint for a channel in `g`, if the unit is that.
 pub(crate) fn gravity_hint(unit: &NamedUnit) -> Option<&'static str> {
     const HINT: &str = "g is gram here; for an acceleration in units of standard gravity write g0";
     (unit.text == "g").then_some(HINT)
 }
 
 impl Motion {
-    /// All of them.
+    /// All kinds of motion.
     pub(crate) const ALL: [Self; 3] = [Self::Displacement, Self::Speed, Self::Acceleration];
 
-    /// Its name in stand files.
+    /// Name in stand files.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Displacement => "displacement",

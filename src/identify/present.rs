@@ -7,7 +7,7 @@ use crate::chart::Page;
 use crate::print::{Report, columns, relative, rounded, short, value_and_std};
 use crate::provenance::Provenance;
 
-/// A table under its heading, and a sentence below it.
+/// A table with its heading, and a note below it.
 struct ResultTable {
     heading: String,
     rows: Vec<Vec<String>>,
@@ -49,7 +49,7 @@ impl Report for Identification {
 }
 
 impl Identification {
-    /// The result as an HTML page that needs no other file.
+    /// The result as a self-contained HTML page.
     pub(crate) fn page(&self, provenance: &Provenance) -> String {
         let mut page = Page::new(&self.title());
         provenance.add_to(&mut page);
@@ -105,7 +105,7 @@ impl Identification {
         format!("{}: {} samples{rate}", self.inputs.join(", "), self.samples)
     }
 
-    /// Results of other methods, and the laws of damping.
+    /// Results of other methods, and the damping laws.
     fn sections(&self) -> Vec<ResultTable> {
         let compared = self.comparisons.iter().map(|other| ResultTable {
             heading: format!("For comparison, {}", other.method),

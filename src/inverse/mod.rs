@@ -1,9 +1,9 @@
-//! From a record back to what was applied, with a stand that has effects no response over frequency can describe.
+//! Inversion of a record to the applied quantity for a stand with effects that a frequency response cannot describe.
 //!
-//! The links of the stand's [`Chain`] are taken in reverse order: disturbances, the recorder's range, the chain, the
-//! gage, the linear dynamics, and last the stand itself, whose torques are evaluated along the motion
-//! (`motion`). How a single effect is inverted is in its own file in `torqcomp_model::effects`; here is what they
-//! share: the band, the continuation beyond the record's ends, the noise. Beyond the band nothing is added.
+//! The links of the stand's [`Chain`] are inverted in reverse order: disturbances, the recorder's range, the chain,
+//! the gage, the linear dynamics, and last the stand itself, whose torques are evaluated along the motion
+//! (`motion`). The inverse of each effect is in its own file in `torqcomp_model::effects`; shared parts are here:
+//! the band, the extension beyond the record's ends, the noise. Nothing is added beyond the band.
 
 mod motion;
 mod spread;
@@ -27,45 +27,46 @@ pub(crate) use motion::{AtRest, Carried};
 pub(crate) use spread::{ResultStd, Spread};
 pub(crate) use windows::RecordWindow;
 
-/// Rounds in which torques of the stand and a coupling past it are brought into agreement.
+/// Maximum number of iterations for the torques of the stand and a coupling past it.
 const ROUNDS: usize = 40;
-/// Change of the torques, relative to the record, at which they agree.
+/// Change of the torques, relative to the record, at which the iteration has converged.
 const AGREED: f64 = 1e-9;
-/// Fewest steps from sample to sample along which torques are evaluated.
+/// Minimum number of steps per sample for evaluating torques.
 const FEWEST_STEPS: usize = 8;
-/// Samples of continuation beyond an end, at least.
+/// Minimum extension beyond an end, in samples.
 const SHORTEST_LEAD: usize = 2048;
-/// Band of what torques and curves see, over that of the result, where noise allows it.
+/// Bandwidth for torques and static characteristics, relative to that of the result, where noise
+/// allows it.
 const WIDER: f64 = 2.0;
-/// Highest part of half the rate that they see.
+/// Maximum of that bandwidth, relative to the Nyquist frequency.
 const HIGHEST: f64 = 0.8;
-/// Growth of noise, over that within the band, up to which a wider band is allowed.
+/// Noise amplification, relative to that within the band, up to which a wider band is allowed.
 const GROWTH: f64 = 1.5;
 
-/// How a record is taken back.
+/// Inversion of a record.
 pub(crate) struct ChainInverse {
     chain: Arc<Chain>,
     filter: InverseFilter,
 }
 
-/// What came out.
+/// Result of an inversion.
 #[derive(Debug, Default)]
 pub(crate) struct InverseResult {
     /// The applied quantity, in SI units.
     pub applied: Vec<f64>,
-    /// Effects with the samples of which the record does not tell enough.
+    /// Effects with the samples that cannot be recovered.
     pub lost: Vec<(&'static str, Unrecovered)>,
     /// Lines that were subtracted.
     pub lines: Vec<FoundLine>,
     /// Where the speed is not significantly different from zero, if a torque depends on its sign.
     pub at_rest: Option<AtRest>,
-    /// Highest frequency that curves and torques have seen.
+    /// Highest frequency used for static characteristics and torques.
     pub seen_to_hz: Option<f64>,
-    /// What the torques in the stand leave to the next window of a long record.
+    /// State of the stand's torques for the next window of a long record.
     next: Option<motion::Carried>,
 }
 
-/// A record on its way back.
+/// A record during its inversion.
 struct Pass<'a> {
     inverse: &'a ChainInverse,
     extension: Extension,
@@ -73,17 +74,17 @@ struct Pass<'a> {
     samples: Vec<f64>,
     /// Standard deviation of the noise of a sample.
     noise_std: f64,
-    /// Torques of the stand, as far as they are known, for couplings past it.
+    /// Torques of the stand, as far as known, for couplings past it.
     torque: Option<&'a [f64]>,
     beside: motion::Beside,
     result: InverseResult,
 }
 
 impl ChainInverse {
-    /// Takes a stand apart for a band.
+    /// Prepares the inversion of a stand for a band.
     ///
     /// # Errors
-    /// If the stand has no mechanics, or effects that cannot be taken back together.
+    /// If the stand has no mechanics, or effects that cannot be inverted together.
     pub(crate) fn new(stand: &Stand, band: Band) -> Result<Self, Failure> {
         let chain = Arc::new(stand.chain()?);
         refuse_bent_coupling(stand, &chain)?;
@@ -93,7 +94,7 @@ impl ChainInverse {
         })
     }
 
-    /// The inverse of the linear part of a stand, from which its band can be chosen.
+    /// Inverse of the linear part of a stand, from which its band can be chosen.
     ///
     /// # Errors
     /// If the stand has no mechanics.
@@ -101,39 +102,40 @@ impl ChainInverse {
         Ok(regular_inverse(Arc::new(stand.chain()?)))
     }
 
-    /// The linear part of the way back, without factors whose inverse has no end in time.
+    /// Inverse of the linear part, without factors whose inverse does not decay.
     pub(crate) fn filter(&self) -> &InverseFilter {
         &self.filter
     }
 
-    /// Gain of the way back, over that of the filter, by the factors whose inverse has no end in time; what they block stays.
+    /// Gain of the inversion relative to the filter, due to the factors whose inverse does not decay; what they block
+    /// stays.
     pub(crate) fn gain_beside_filter(&self, frequency_hz: f64) -> f64 {
         let endless = |link: &Link| self.is_endless(link);
         1.0 / self.chain.response_of(frequency_hz, endless).norm()
     }
 
-    /// Whether what is before a record and behind it is felt all through when a factor is divided out.
+    /// Whether dividing out a factor makes the whole record depend on what precedes and follows it.
     fn is_endless(&self, link: &Link) -> bool {
         let stand = &self.chain.stand;
         !link.dies_out(stand) && !link.blocks_constants(stand)
     }
 
-    /// The first effect of which that is so.
+    /// The first such effect.
     pub(crate) fn endless(&self) -> Option<&'static str> {
         let link = self.links().iter().find(|link| self.is_endless(link));
         link.map(|link| link.effect)
     }
 
-    /// The links, in the order from torque to record.
+    /// The links in order from torque to record.
     pub(crate) fn links(&self) -> &[Link] {
         self.chain.links()
     }
 
-    /// Takes a record back, in SI units of the record; `noise_std` is the standard deviation of its
-    /// noise, 0 if none is known.
+    /// Inverts a record in its SI units; `noise_std` is the standard deviation of its noise, 0 if
+    /// unknown.
     ///
     /// # Errors
-    /// If a coupling past the stand and the torques in it do not come into agreement.
+    /// If the iteration between a coupling past the stand and its torques does not converge.
     pub(crate) fn run(
         &self,
         record: &[f64],
@@ -143,12 +145,12 @@ impl ChainInverse {
         self.beside(record, rate_hz, noise_std, motion::Beside::default())
     }
 
-    /// Samples beyond an end of a record that the way back looks at.
+    /// Samples beyond an end of a record used in the inversion.
     fn lead(&self) -> usize {
         (4 * self.filter.half_length()).max(SHORTEST_LEAD)
     }
 
-    /// Takes a record back, or a window of one.
+    /// Inverts a record, or a window of one.
     fn beside(
         &self,
         record: &[f64],
@@ -200,7 +202,7 @@ impl ChainInverse {
     }
 }
 
-/// The linear part of the way back, without factors whose inverse has no end in time.
+/// Inverse of the linear part, without factors whose inverse does not decay.
 fn regular_inverse(chain: Arc<Chain>) -> Inverse {
     Arc::new(move |hz| {
         let regular = |link: &Link| link.dies_out(&chain.stand);
@@ -208,7 +210,7 @@ fn regular_inverse(chain: Arc<Chain>) -> Inverse {
     })
 }
 
-/// Refuses a coupling past a curve: what reaches the record past the stand is bent with the rest of it.
+/// Rejects a coupling past a static characteristic, as that also acts on the coupled signal.
 fn refuse_bent_coupling(stand: &Stand, chain: &Chain) -> Result<(), Failure> {
     let links = chain.links();
     let is_bent =
@@ -230,7 +232,7 @@ fn refuse_bent_coupling(stand: &Stand, chain: &Chain) -> Result<(), Failure> {
 }
 
 impl Pass<'_> {
-    /// All the way back, and the torques that were found in the stand.
+    /// Complete inversion, and the torques found in the stand.
     fn back(mut self) -> (InverseResult, Vec<f64>) {
         self.disturbances();
         let groups = self.inverse.chain.groups();
@@ -290,7 +292,7 @@ impl Pass<'_> {
         }
     }
 
-    /// Divides linear links out, in a band as wide as noise allows.
+    /// Divides out linear links, in a band as wide as noise allows.
     fn divide(&mut self, links: &[&Link]) {
         self.uncouple(links);
         if links.is_empty() {
@@ -307,7 +309,7 @@ impl Pass<'_> {
         self.result.seen_to_hz = Some(band.top_hz());
     }
 
-    /// Where a link blocks constants, takes off the slope that its inverse brings in.
+    /// Removes the slope introduced by the inverse of a link that blocks constants.
     fn level(&mut self, links: &[&Link], before: &[f64]) {
         let stand = &self.inverse.chain.stand;
         if links.iter().any(|link| link.blocks_constants(stand)) {
@@ -315,7 +317,7 @@ impl Pass<'_> {
         }
     }
 
-    /// The inverse of some of the linear links.
+    /// Inverse of a selection of the linear links.
     fn inverse_of<'b>(&self, some: &'b [&Link]) -> impl Fn(f64) -> Complex64 + 'b
     where
         Self: 'b,
@@ -327,7 +329,7 @@ impl Pass<'_> {
         }
     }
 
-    /// Subtracts what torques of the stand contribute to a coupling past it.
+    /// Subtracts the contribution of the stand's torques to a coupling past it.
     fn uncouple(&mut self, links: &[&Link]) {
         let chain = &self.inverse.chain;
         if let Some(torque) = self.torque
@@ -342,7 +344,7 @@ impl Pass<'_> {
         }
     }
 
-    /// The widest band in which an inverse does not blow noise up.
+    /// The widest band in which an inverse does not amplify noise excessively.
     fn wide(&self, inverse: &impl Fn(f64) -> Complex64) -> Band {
         let band = self.inverse.band();
         let rate_hz = band.sample_rate_hz();
@@ -407,7 +409,7 @@ impl Pass<'_> {
         found.torque
     }
 
-    /// The linear stand, with what is left of linear links, in the band.
+    /// The linear stand, with the remaining linear links, in the band.
     fn finish(&mut self, rest: &[&Link], torque: Option<&[f64]>) {
         let chain = &self.inverse.chain;
         let inverse = self.inverse_of(rest);
@@ -433,7 +435,7 @@ impl Pass<'_> {
     }
 }
 
-/// An inverse in a band; beyond, it is not asked.
+/// An inverse within a band; not evaluated beyond it.
 fn held(inverse: &impl Fn(f64) -> Complex64, band: &Band, hz: f64) -> Complex64 {
     match band.gain(hz) {
         0.0 => Complex64::ZERO,
@@ -441,17 +443,17 @@ fn held(inverse: &impl Fn(f64) -> Complex64, band: &Band, hz: f64) -> Complex64 
     }
 }
 
-/// Rms out over rms in, for white noise through an inverse in a band.
+/// Noise gain (output over input RMS) of an inverse in a band, for white noise.
 fn growth(inverse: &impl Fn(f64) -> Complex64, band: &Band) -> f64 {
     mean_square(band, |hz| held(inverse, band, hz).norm_sqr()).sqrt()
 }
 
-/// Rms of the speed over rms of the samples, for white noise in a band, per second.
+/// RMS speed over RMS of the samples, for white noise in a band, per second.
 fn speed_gain(band: &Band) -> f64 {
     mean_square(band, |hz| (TAU * hz * band.gain(hz)).powi(2)).sqrt()
 }
 
-/// Mean up to half the rate.
+/// Mean up to the Nyquist frequency.
 fn mean_square(band: &Band, power: impl Fn(f64) -> f64) -> f64 {
     const STEPS: usize = 2000;
     let step_hz = 0.5 * band.sample_rate_hz() / STEPS as f64;

@@ -1,9 +1,9 @@
-//! The torque from the measured motion: what restoring and friction torques of the stand add to it.
+//! Torque from the measured motion: contribution of the stand's restoring and friction torques.
 //!
-//! With the gage's signal `y = x + Σ n_shown(x)` the displacement `x` is found, then every torque `n(x, x', z)` of the
-//! stand along it, on a grid several times finer than the samples so that what they make of the motion does
-//! not alias; memory moves on from the record's start. The applied quantity follows as
-//! `G u = x''/ω₀² + 2ζ x'/ω₀ + x + n` (the linear part by its response).
+//! The displacement `x` is found from the gage signal `y = x + Σ n_shown(x)`, then every torque `n(x, x', z)` of the
+//! stand along it, on a grid several times finer than the samples so that the torques do not alias; their memory
+//! starts with the record. The applied quantity is `G u = x''/ω₀² + 2ζ x'/ω₀ + x + n` (the linear part by its
+//! response).
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -14,21 +14,21 @@ use torqcomp_dsp::compensate::{Fine, continued};
 use torqcomp_model::chain::{GagePath, GageState};
 use torqcomp_model::effects::{Memory, Torque};
 
-/// Samples of a block, and those on both sides that are computed to spare.
+/// Samples per block, and margin computed on both sides.
 pub const BLOCK: usize = 16_384;
 const MARGIN: usize = 1024;
-/// Shortest block of a short record.
+/// Minimum block length for a short record.
 const SHORTEST: usize = 256;
 
-/// How the motion is looked at.
+/// Parameters for the evaluation of the motion.
 pub struct View<'a> {
-    /// Samples a second.
+    /// Sampling rate in Hz.
     pub rate_hz: f64,
-    /// Steps from sample to sample.
+    /// Steps per sample.
     pub factor: usize,
-    /// Displacement by a constant load that the torques see.
+    /// Displacement under a constant load, as seen by the torques.
     pub shift: f64,
-    /// Band in which the torques see displacement and speed.
+    /// Bandwidth of displacement and speed for the torques.
     pub band: &'a Band,
     /// Standard uncertainty of the speed, per second.
     pub speed_std: f64,
@@ -69,15 +69,16 @@ pub struct Motion {
     pub x: Vec<f64>,
     /// Sum of the torques.
     pub torque: Vec<f64>,
-    /// Samples at which the gage's signal does not determine the displacement.
+    /// Samples at which the gage signal does not determine the displacement.
     pub hidden: Vec<usize>,
     /// Where the speed is within two standard uncertainties of zero.
     pub at_rest: AtRest,
-    /// Where the next window goes on, if one does.
+    /// State for the next window, if any.
     pub next: Option<Carried>,
 }
 
-/// The end of a window's own part: what the next one, which begins a margin before, goes on from.
+/// State at the end of a window's own part, from which the next one, starting a margin earlier,
+/// continues.
 #[derive(Debug)]
 pub(crate) struct Carried {
     /// Displacement and torques over that margin.
@@ -88,17 +89,17 @@ pub(crate) struct Carried {
     gage: GageState,
 }
 
-/// What a window of a long record has to do with those beside it.
+/// Connection of a window of a long record with its neighbours.
 #[derive(Debug, Default)]
 pub struct Beside {
-    /// What the window before has left.
+    /// State from the previous window.
     pub before: Option<Carried>,
-    /// Where the window's own part ends, a number of whole blocks behind its beginning, and how many samples before that
-    /// the next window begins.
+    /// End of the window's own part, a whole number of blocks after its start, and number of samples before it at which
+    /// the next window starts.
     pub end: Option<(usize, usize)>,
 }
 
-/// Displacement and torques along a signal of the gage.
+/// Displacement and torques for a gage signal.
 pub fn motion(
     torques: &[&dyn Torque],
     gage_path: GagePath,
@@ -151,7 +152,7 @@ struct MotionPass<'a> {
     fine: Fine,
     memories: Vec<Memory>,
     gage_path: GagePath<'a>,
-    /// Torques of the end of the block before.
+    /// Torques at the end of the previous block.
     kept: Option<Vec<f64>>,
     /// Summed over the steps.
     at_rest: AtRest,
@@ -159,7 +160,7 @@ struct MotionPass<'a> {
 }
 
 impl MotionPass<'_> {
-    /// The present state, with what was found over a range.
+    /// The present state, with the results over a range.
     fn carried(&self, range: Range<usize>) -> Carried {
         Carried {
             x: self.found.x[range.clone()].to_vec(),
@@ -215,7 +216,7 @@ impl MotionPass<'_> {
         let mut after = Vec::new();
         for i in first..x.len() {
             if i == last {
-                // What follows is computed again in the next block.
+                // The rest is computed again in the next block.
                 after = memories.clone();
             }
             let change = 0.5 * (speed[(i + 1).min(x.len() - 1)] - speed[i - 1]);
@@ -271,7 +272,7 @@ impl MotionPass<'_> {
     }
 
     fn sum(&self, memories: &mut [Memory], x: f64, speed: f64, change: f64) -> f64 {
-        // Within a step the speed takes all values of the step.
+        // The speed varies uniformly within a step.
         let std = self.view.speed_std.hypot(change / 12.0_f64.sqrt());
         let pairs = self.torques.iter().zip(memories);
         pairs

@@ -1,7 +1,7 @@
-//! Standard uncertainty of a record that was taken back, from those of the constants in the stand file.
+//! Standard uncertainty of an inverted record, from those of the constants in the stand file.
 //!
-//! No response over frequency describes such a stand, so that each constant is moved by its standard uncertainty to either
-//! side, and the record is taken back with both: half the difference is what this constant contributes, sample by sample.
+//! Such a stand has no frequency response, so each constant is varied by its standard uncertainty in both directions
+//! and the record is inverted with both: half the difference is the contribution of this constant, sample by sample.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -12,7 +12,8 @@ use super::ChainInverse;
 use crate::failure::Failure;
 use crate::stand::{ConstantStd, Stand, VariedConstant, combined};
 
-/// Part of a constant's contribution by which the result may bend over its standard uncertainty.
+/// Allowed nonlinearity of the result over a constant's standard uncertainty, relative to its
+/// contribution.
 const STRAIGHT: f64 = 0.3;
 
 /// Standard uncertainty of a result, in its unit.
@@ -34,7 +35,7 @@ pub(crate) struct ResultStd {
 }
 
 impl ResultStd {
-    /// In another unit: so many of it per SI unit.
+    /// Converted to another unit, `scale` of it per SI unit.
     pub(crate) fn scaled(mut self, scale: f64) -> Self {
         for std in [&mut self.rms, &mut self.largest, &mut self.of_response_rms] {
             *std = std.map(|std| std * scale);
@@ -43,25 +44,25 @@ impl ResultStd {
     }
 }
 
-/// A record that is taken back with moved constants.
+/// Inversion of a record with varied constants.
 pub(crate) struct Spread<'a> {
     pub stand: &'a Stand,
     pub band: &'a Band,
     /// In SI units of the record, its first samples at least.
     pub record: &'a [f64],
     pub noise_std: f64,
-    /// Of the constant that made the record.
+    /// Of the calibration constant.
     pub constant: ConstantStd,
 }
 
 impl Spread<'_> {
-    /// Samples from the start of the record that are looked at.
+    /// Number of samples from the start of the record that are used.
     pub(crate) const LOOKED_AT: usize = 1 << 16;
 
-    /// The standard uncertainty; `None` if nothing has one.
+    /// The standard uncertainty; `None` if no constant has one.
     ///
     /// # Errors
-    /// If the record cannot be taken back.
+    /// If the record cannot be inverted.
     pub(crate) fn find(&self) -> Result<Option<ResultStd>, Failure> {
         let varied = self.stand.varied();
         if varied.is_empty() && self.constant.known().is_none() {
@@ -117,7 +118,7 @@ impl Spread<'_> {
         Ok(Some(found))
     }
 
-    /// What acted on a stand by the record times a factor.
+    /// Applied quantity on a stand for the record times a factor.
     fn back(&self, stand: &Stand, factor: f64) -> Result<Vec<f64>, Failure> {
         let inverse = ChainInverse::new(stand, self.band.clone())?;
         let count = self.record.len().min(Self::LOOKED_AT);
@@ -126,7 +127,7 @@ impl Spread<'_> {
         Ok(undone.applied)
     }
 
-    /// The record taken back with a constant moved to either side.
+    /// The record inverted with a constant varied in both directions.
     fn sides(&self, constant: VariedConstant) -> Option<[Vec<f64>; 2]> {
         let side = |by: f64| self.back(&self.stand.moved(constant, by)?, 1.0).ok();
         let [low, high] = [side(-1.0)?, side(1.0)?];
@@ -134,8 +135,7 @@ impl Spread<'_> {
         is_finite.then_some([low, high])
     }
 
-    /// What the constant contributes that made the record: a static gain divides the result, a calibration scales the
-    /// record.
+    /// Contribution of the calibration constant: a static gain divides the result, a calibration scales the record.
     fn of_constant(&self, std: f64, middle: &[f64]) -> Result<Vec<f64>, Failure> {
         if self.stand.static_gain().is_some() {
             return Ok(middle.iter().map(|v| std * v).collect());
@@ -168,7 +168,7 @@ fn half_difference([low, high]: &[Vec<f64>; 2]) -> Vec<f64> {
     low.iter().zip(high).map(|(a, b)| (b - a) / 2.0).collect()
 }
 
-/// Rms of the distance of the middle from the straight line between both sides.
+/// RMS distance of the middle from the mean of both sides.
 fn bend([low, high]: &[Vec<f64>; 2], middle: &[f64]) -> f64 {
     let sides = low.iter().zip(high).zip(middle);
     let off: Vec<f64> = sides.map(|((a, b), m)| (a + b) / 2.0 - m).collect();

@@ -1,5 +1,5 @@
-//! Long records, window by window: the linear links of a chain look a margin beyond what they are asked for, and what the
-//! torques of the stand remember goes on from one window to the next.
+//! Windowed inversion of long records: the linear links of a chain use a margin around each window, and the memory of
+//! the stand's torques continues from one window to the next.
 
 use std::ops::Range;
 
@@ -9,20 +9,20 @@ use super::motion::{BLOCK, Beside, Carried};
 use super::{ChainInverse, InverseResult};
 use crate::failure::Failure;
 
-/// Samples that a window adds to the result.
+/// Number of samples that a window adds to the result.
 const OWN: usize = 8 * BLOCK;
 
-/// A part of a record that is taken back by itself.
+/// A part of a record that is inverted separately.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RecordWindow {
-    /// Samples that are looked at.
+    /// Samples used.
     pub seen: Range<usize>,
-    /// Those of which the result is wanted.
+    /// Samples of the result.
     pub own: Range<usize>,
 }
 
 impl RecordWindow {
-    /// The windows of so many samples: one, unless there is a margin within which its ends do not matter.
+    /// Windows for `count` samples: one, unless there is a margin beyond which the ends have no effect.
     fn all(count: usize, margin: Option<usize>, own: usize) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
         let Some(margin) = margin else {
@@ -33,7 +33,7 @@ impl RecordWindow {
         };
         loop {
             let start = all.last().map_or(0, |window| window.own.end);
-            // What is left for another window must be longer than a margin.
+            // The remainder for another window must be longer than a margin.
             let is_last = count - start <= own + margin;
             let end = if is_last { count } else { start + own };
             all.push(Self {
@@ -46,16 +46,16 @@ impl RecordWindow {
         }
     }
 
-    /// The own samples among those that are looked at.
+    /// The own samples relative to those used.
     pub(crate) fn inner(&self) -> Range<usize> {
         self.own.start - self.seen.start..self.own.end - self.seen.start
     }
 }
 
 impl ChainInverse {
-    /// Samples on both sides of a window beyond which nothing matters to it; `None` if the record has to be taken back as a
-    /// whole: for lines and courses that are fitted to all of it, for what depends on its time or has memory of its own, for
-    /// a coupling past the stand, and for links whose inverse does not die out.
+    /// Number of samples on both sides of a window beyond which nothing affects it; `None` if the record has to be
+    /// inverted as a whole: for lines and trends that are fitted to all of it, for effects that depend on time or have
+    /// their own memory, for a coupling past the stand, and for links whose inverse does not decay.
     pub(crate) fn margin(&self) -> Option<usize> {
         let stand = &self.chain.stand;
         let is_local = self.links().iter().all(|link| match &link.action {
@@ -66,13 +66,13 @@ impl ChainInverse {
         Some(self.lead()).filter(|lead| is_local && *lead <= OWN)
     }
 
-    /// The windows in which a record of so many samples is taken back.
+    /// The windows in which a record of `count` samples is inverted.
     pub(crate) fn windows(&self, count: usize) -> Vec<RecordWindow> {
         RecordWindow::all(count, self.margin(), OWN)
     }
 
-    /// Takes a window of a record back; what it leaves to the next one takes the place of what the window before has left.
-    /// The result is that of the window's own samples, counted from the first of the record.
+    /// Inverts a window of a record, replacing the state from the previous window by that for the next one. The result
+    /// covers the window's own samples, indexed from the first of the record.
     ///
     /// # Errors
     /// Those of [`ChainInverse::run`].
@@ -84,7 +84,7 @@ impl ChainInverse {
         carried: &mut Option<Carried>,
     ) -> Result<InverseResult, Failure> {
         let own = window.inner();
-        // The next one begins as far before the end of this one's own part as this one has looked beyond it.
+        // The next window starts as far before the end of this one's own part as this one extends beyond it.
         let margin = window.seen.end - window.own.end;
         let beside = Beside {
             before: carried.take(),
@@ -105,7 +105,7 @@ impl ChainInverse {
 }
 
 impl InverseResult {
-    /// Adds what was found in a further window but its samples; `part` is the part of the record that is its own.
+    /// Merges the results of a further window except its samples; `part` is its fraction of the record.
     pub(crate) fn join(&mut self, further: Self, part: f64) {
         for (effect, lost) in further.lost {
             match self.lost.iter_mut().find(|(known, _)| *known == effect) {
@@ -127,7 +127,7 @@ mod tests {
     use super::*;
     use crate::stand;
 
-    /// Windows of a record give what the record gives as a whole, for torques with memory and without.
+    /// Inversion in windows equals that of the whole record, for torques with memory and without.
     #[test]
     fn windows_are_as_good_as_the_whole() {
         let effects = [

@@ -1,24 +1,24 @@
-//! `f64` to decimal text with a fixed number of significant digits.
+//! Conversion of `f64` to decimal text with a fixed number of significant digits.
 
-/// Significant digits that are written unless asked otherwise.
+/// Default number of significant digits.
 ///
-/// A rounding of 5·10⁻¹² relative is far below any recorder's resolution, and below the 10⁻⁹ to
-/// which a compensation is exact.
+/// A relative rounding of 5·10⁻¹² is far below any recorder's resolution, and below the 10⁻⁹
+/// accuracy of a compensation.
 pub const DEFAULT_COUNT: u32 = 12;
 
-/// The same as a choice of digits.
+/// The default as [`Digits`].
 pub const DEFAULT_DIGITS: Digits = Digits::Significant(DEFAULT_COUNT);
 
-/// How many digits are written.
+/// Number of digits written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Digits {
-    /// That many significant digits, 1 to 15, trailing zeros left out.
+    /// This many significant digits, 1 to 15, without trailing zeros.
     Significant(u32),
-    /// As few as bring back the same `f64`.
+    /// As few as reproduce the same `f64`.
     Shortest,
 }
 
-/// Decimal exponents that the quick way covers; the rest is rare and takes the library's way.
+/// Decimal exponents of the fast method; the rest is rare and uses the standard library.
 const SMALLEST_EXPONENT: i32 = -20;
 const LARGEST_EXPONENT: i32 = 21;
 
@@ -31,18 +31,18 @@ const SCALES: [f64; 57] = [
 ];
 const SCALE_START: i32 = -21;
 
-/// Largest plain notation: above it, and below `1e-5`, the text has an exponent.
+/// Largest exponent of plain notation: above it, and below `1e-5`, the text has an exponent.
 const LARGEST_PLAIN: i32 = 15;
 const SMALLEST_PLAIN: i32 = -5;
 
-/// Room that one number may need: 17 digits, sign, point, leading zeros or exponent, and the slack
-/// that copies of a fixed length run over.
+/// Buffer size for one number: 17 digits, sign, point, leading zeros or exponent, and the slack for
+/// copies of fixed length.
 pub const ROOM: usize = 48;
 
 /// Appends a finite number.
 ///
-/// With [`Digits::Significant`] one product of two correctly rounded factors stands between the value
-/// and its digits: the last of 12 is rounded to within 0.501 of a unit, that of 15 to within 0.8.
+/// With [`Digits::Significant`] the digits come from one product of two correctly rounded factors:
+/// the last of 12 is rounded to within 0.501 of a unit, that of 15 to within 0.8.
 #[inline]
 pub fn write(out: &mut Vec<u8>, value: f64, digits: Digits) {
     let mut text = [0; ROOM];
@@ -50,8 +50,8 @@ pub fn write(out: &mut Vec<u8>, value: f64, digits: Digits) {
     out.extend_from_slice(&text[..length]);
 }
 
-/// Puts a finite number at the start of `text` and tells its length; what stands after it is left
-/// over.
+/// Writes a finite number to the start of `text` and returns its length; the bytes after it are
+/// arbitrary.
 #[inline]
 pub fn put(text: &mut [u8; ROOM], value: f64, digits: Digits) -> usize {
     match digits {
@@ -65,16 +65,16 @@ fn put_text(text: &mut [u8; ROOM], number: &str) -> usize {
     number.len()
 }
 
-/// A number taken apart into its digits, before it becomes text.
+/// A number decomposed into its digits, before conversion to text.
 ///
-/// Several are best taken apart one after the other and put into text after that: the steps of one
-/// wait for each other, those of several do not.
+/// It is faster to decompose several first and convert them afterwards: the steps for one number
+/// depend on each other, those for several do not.
 #[derive(Debug, Clone, Copy)]
 pub struct Decimal {
     value: f64,
-    /// Sixteen ASCII digits, the first in the lowest byte, zeros after the last that is wanted.
+    /// Sixteen ASCII digits, the first in the lowest byte, zeros after the last significant one.
     digits: u128,
-    /// Decimal exponent of the first digit; `RARE` for a value that is written in another way.
+    /// Decimal exponent of the first digit; `RARE` for a value written by the other method.
     exponent: i32,
     count: u32,
 }
@@ -83,7 +83,7 @@ pub struct Decimal {
 const RARE: i32 = i32::MAX;
 
 impl Decimal {
-    /// Takes a finite number apart, to that many significant digits (1 to 15).
+    /// Decomposes a finite number, to this many significant digits (1 to 15).
     #[inline(always)]
     #[must_use]
     pub fn of(value: f64, count: u32) -> Self {
@@ -96,11 +96,11 @@ impl Decimal {
         }
     }
 
-    /// Puts it at the start of `text` and tells its length.
+    /// Writes it to the start of `text` and returns its length.
     #[inline(always)]
     pub fn put(&self, text: &mut [u8; ROOM]) -> usize {
         if (SMALLEST_PLAIN..LARGEST_PLAIN).contains(&self.exponent) {
-            // A sign is overwritten where there is none.
+            // The sign is overwritten if there is none.
             text[0] = b'-';
             let start = usize::from(self.value < 0.0);
             put_plain(text, start, self.digits, self.significant(), self.exponent)
@@ -109,7 +109,7 @@ impl Decimal {
         }
     }
 
-    /// Digits without the zeros at their end.
+    /// Number of digits without trailing zeros.
     #[inline(always)]
     fn significant(&self) -> usize {
         16 - ((self.digits ^ ASCII_ZEROS).leading_zeros() / 8) as usize
@@ -129,7 +129,7 @@ impl Decimal {
     }
 }
 
-/// Powers of ten that fill up a number to sixteen digits.
+/// Powers of ten that scale a number to sixteen digits.
 const WHOLE_POWERS: [u64; 16] = {
     let mut powers = [1; 16];
     let mut i = 1;
@@ -145,7 +145,7 @@ const ASCII_ZEROS: u128 = 0x3030_3030_3030_3030_3030_3030_3030_3030;
 /// Integer of `count` digits and decimal exponent with `value ≈ d.ddd × 10^exponent`.
 #[inline(always)]
 fn decompose(magnitude: f64, count: u32) -> Option<(u64, i32)> {
-    // log10(2) times the binary exponent is at most one too low.
+    // log10(2) times the binary exponent is too low by at most one.
     let binary = ((magnitude.to_bits() >> 52) & 0x7FF) as i32 - 1023;
     let mut exponent = (binary * 1233) >> 12;
     if !(SMALLEST_EXPONENT..LARGEST_EXPONENT).contains(&exponent) {
@@ -198,19 +198,19 @@ static FOUR_DIGITS: [u32; 10_000] = {
     table
 };
 
-/// So many bytes of a text from a place on, to be set at once: a copy between slices is a call of memmove where it is not
-/// inlined.
+/// A fixed number of bytes of a text from `at` on, to be set at once: a copy between slices is a call of memmove where
+/// it is not inlined.
 ///
 /// # Panics
-/// If the text is shorter than that.
+/// If the text is shorter.
 #[inline(always)]
 pub(super) fn chunk_at<const N: usize>(text: &mut [u8], at: usize) -> &mut [u8; N] {
     text[at..].first_chunk_mut().expect("room for a piece")
 }
 
-/// `0.00ddd`, `dd.ddd` or `dddd`. Bytes after the length told are left over.
+/// `0.00ddd`, `dd.ddd` or `dddd`. Bytes after the returned length are arbitrary.
 ///
-/// Written without a branch: whether a number is below one or above cannot be foreseen.
+/// Branch-free, as whether a number is below one is unpredictable.
 #[inline(always)]
 fn put_plain(
     text: &mut [u8; ROOM],
@@ -261,7 +261,7 @@ fn rare(value: f64, count: u32) -> String {
     format!("{digits}e{exponent}")
 }
 
-/// Text of a finite number with that many significant digits.
+/// Text of a finite number with this many significant digits.
 #[must_use]
 pub fn text(value: f64, significant: u32) -> String {
     let mut out = Vec::new();
@@ -318,7 +318,7 @@ mod tests {
             let unit = 10_f64.powi(value.abs().log10().floor() as i32 + 1 - count as i32);
             // Rounding of the product and of its factor: 1.5 ε of at most ten units of the first digit.
             let product = 1.5 * f64::EPSILON * 10_f64.powi(count as i32);
-            // The comparison itself is good to a unit of the f64.
+            // The comparison itself is accurate to a unit of the f64.
             prop_assert!((back - value).abs() <= (0.5 + product) * unit + f64::EPSILON * value.abs());
         }
 

@@ -1,11 +1,12 @@
-//! Faults on purpose: tests make any one call to the system fail and look at what is left. Optimised builds have none of this.
+//! Fault injection: tests make any one system call fail and examine the result. Optimised builds have none of this.
 //!
-//! `TORQCOMP_FAULT="write 2 28"` makes the third write fail with the error number 28. In place of the number, `short` moves one
-//! byte only, and `abort` ends the process there and then. `TORQCOMP_FAULT_LOG` names a file that lists the calls of a run.
+//! `TORQCOMP_FAULT="write 2 28"` makes the third write fail with the error number 28. Instead of the number, `short`
+//! moves one byte only, and `abort` ends the process immediately. `TORQCOMP_FAULT_LOG` names a file that lists the
+//! calls of a run.
 
 use std::io;
 
-/// A call to the system that may fail.
+/// A system call that may fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Call {
     Open,
@@ -17,14 +18,14 @@ pub enum Call {
     Rename,
 }
 
-/// How many bytes a call may move, or how it fails.
+/// Number of bytes a call may move, or its failure.
 #[cfg(not(debug_assertions))]
 #[inline(always)]
 pub fn limit(_: Call, bytes: usize) -> io::Result<usize> {
     Ok(bytes)
 }
 
-/// How many bytes a call may move, or how it fails.
+/// Number of bytes a call may move, or its failure.
 #[cfg(debug_assertions)]
 pub fn limit(call: Call, bytes: usize) -> io::Result<usize> {
     use std::sync::LazyLock;
@@ -60,7 +61,7 @@ pub fn limit(call: Call, bytes: usize) -> io::Result<usize> {
     }
 }
 
-/// Lets a call that moves no bytes fail.
+/// Failure of a call that moves no bytes.
 pub fn check(call: Call) -> io::Result<()> {
     limit(call, 0).map(|_| ())
 }

@@ -1,4 +1,4 @@
-//! Where a recording is read from.
+//! Input of a recording.
 
 use std::io::{self, BufRead, Cursor, ErrorKind, Read};
 use std::path::{Path, PathBuf};
@@ -9,12 +9,12 @@ use super::storage::Stored;
 use crate::failure::Failure;
 use crate::file_name::{ShowPath, is_dash};
 
-/// The first bytes of an MCAP file that do not tell its version.
+/// First bytes of an MCAP file, without the version.
 pub(crate) const MCAP_START: &[u8] = b"\x89MCAP";
-/// First bytes that are looked at before a file is read.
+/// Number of bytes examined before a file is read.
 pub(crate) const HEAD: usize = 512;
 
-/// The content of standard input if it is compressed, with the bytes that were looked at and not yet read.
+/// Content of standard input if compressed, with the bytes that were examined and not yet read.
 static UNPACKED_STDIN: Mutex<Option<UnpackedStdin>> = Mutex::new(None);
 
 struct UnpackedStdin {
@@ -23,7 +23,7 @@ struct UnpackedStdin {
     rest: Box<dyn Read + Send>,
 }
 
-/// Where bytes come from.
+/// Source of bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Input {
     /// Standard input.
@@ -43,7 +43,7 @@ impl Input {
         }
     }
 
-    /// Name for people.
+    /// Name for messages.
     #[must_use]
     pub fn name(&self) -> String {
         match self {
@@ -52,7 +52,7 @@ impl Input {
         }
     }
 
-    /// Whether it begins as an MCAP file does; of standard input nothing is taken.
+    /// Whether it begins like an MCAP file; nothing is consumed from standard input.
     ///
     /// # Errors
     /// If it cannot be opened.
@@ -60,7 +60,7 @@ impl Input {
         Ok(self.head()?.starts_with(MCAP_START))
     }
 
-    /// How it is compressed, if it is; `None` of a pipe, which can be read once only.
+    /// Its compression, if any; `None` for a pipe, which can be read only once.
     pub(crate) fn packing(&self) -> Option<Packing> {
         let Self::File(path) = self else {
             let stdin = UNPACKED_STDIN
@@ -75,7 +75,8 @@ impl Input {
         Packing::of(&first)
     }
 
-    /// How its content is written, for people: behind the name of a compression.
+    /// Description of its encoding, for messages: the name of the compression, then that of the
+    /// content.
     pub(crate) fn dialect(&self, of_content: &str) -> String {
         match self.packing() {
             Some(packing) => format!("{}, {of_content}", packing.name()),
@@ -83,8 +84,7 @@ impl Input {
         }
     }
 
-    /// The file whose bytes are those that `open` gives, and that can be sought in; `None` of standard input and of what is
-    /// compressed.
+    /// The seekable file whose bytes `open` returns; `None` for standard input and compressed files.
     pub(crate) fn plain_file(&self) -> Option<&Path> {
         match self {
             Self::File(path) if self.packing().is_none() => Some(path),
@@ -92,7 +92,7 @@ impl Input {
         }
     }
 
-    /// The first bytes of the content; of standard input nothing is taken.
+    /// The first bytes of the content; nothing is consumed from standard input.
     ///
     /// # Errors
     /// If it cannot be opened or read.
@@ -116,7 +116,7 @@ impl Input {
                 let mut stdin = std::io::stdin().lock();
                 first.extend_from_slice(stdin.fill_buf().unwrap_or_default());
             }
-            // What is taken of a pipe is gone.
+            // Bytes taken from a pipe would be lost.
             Self::File(path) if !is_regular(path) && path.exists() => {}
             Self::File(_) => {
                 let mut start = self.open()?.take(HEAD as u64);
@@ -128,7 +128,7 @@ impl Input {
         Ok(first)
     }
 
-    /// Whether standard input is compressed; then it is unpacked from here on.
+    /// Whether standard input is compressed; it is decompressed from here on.
     fn is_unpacked_stdin(&self) -> Result<bool, Failure> {
         let mut stdin = UNPACKED_STDIN
             .lock()
@@ -136,7 +136,7 @@ impl Input {
         if stdin.is_some() {
             return Ok(true);
         }
-        // The lock of standard input must be free again before anything reads from it.
+        // The lock of standard input must be released before anything reads from it.
         let packing = Packing::of(std::io::stdin().lock().fill_buf().unwrap_or_default());
         if let Some(packing) = packing {
             let rest = packing.unpack(Stored::stdin());
@@ -149,7 +149,7 @@ impl Input {
         Ok(stdin.is_some())
     }
 
-    /// The failure to read it.
+    /// Failure to read it.
     pub fn unreadable(&self, error: &io::Error) -> Failure {
         match error.kind() {
             ErrorKind::InvalidData => Failure::unreadable(error).at(self.name()),
@@ -160,7 +160,7 @@ impl Input {
         }
     }
 
-    /// Opens its content for reading: what is compressed is unpacked.
+    /// Opens its content for reading, decompressed if necessary.
     ///
     /// # Errors
     /// If it cannot be opened.
@@ -191,7 +191,7 @@ fn is_regular(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|meta| meta.is_file())
 }
 
-/// The content of standard input that is compressed.
+/// Content of compressed standard input.
 struct StdinContent;
 
 impl Read for StdinContent {

@@ -1,4 +1,4 @@
-//! Files of JSON lines that are appended to durably, by several processes if need be.
+//! JSON-lines files with durable appending, also by several processes.
 
 use std::fs::File;
 use std::io;
@@ -8,7 +8,7 @@ use super::storage;
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::ShowPath;
 
-/// First bytes in which a line of the file's kind is looked for.
+/// Number of leading bytes in which a line of the file's kind is searched for.
 const LOOKED_AT: usize = 1 << 16;
 
 /// A file of JSON lines.
@@ -19,7 +19,7 @@ pub(crate) struct JsonLines {
 }
 
 impl JsonLines {
-    /// Opens a file whose lines have this beginning, and makes it if it is not there.
+    /// Opens a file whose lines begin like this, or creates it.
     ///
     /// # Errors
     /// If it cannot be written, or is another kind of file.
@@ -28,7 +28,7 @@ impl JsonLines {
         let file = storage::open_at_end(path).map_err(unwritable)?;
         let first = storage::first_bytes(&file, LOOKED_AT).map_err(unwritable)?;
         let mut lines = first.split(|byte| *byte == b'\n');
-        // The first line may be cut.
+        // The first line may be truncated.
         let is_of_kind = beginning.as_bytes().starts_with(&first)
             || lines.any(|line| line.starts_with(beginning.as_bytes()));
         if !is_of_kind {
@@ -53,8 +53,8 @@ impl JsonLines {
         })
     }
 
-    /// Adds lines, which are on the disk afterwards. Those of several processes are not mixed, and a line that was cut
-    /// short stays by itself.
+    /// Appends lines durably. Those of several processes are not interleaved, and a line that was cut short remains a
+    /// separate line.
     ///
     /// # Errors
     /// If they cannot be written.
@@ -63,7 +63,7 @@ impl JsonLines {
         self.settle()
     }
 
-    /// Adds lines as [`JsonLines::append`] does; they are on the disk once they are settled. Threads add one at a time.
+    /// Appends lines as [`JsonLines::append`] does; they are durable only once settled. Threads append one at a time.
     ///
     /// # Errors
     /// If they cannot be written.
@@ -71,10 +71,10 @@ impl JsonLines {
         self.write(lines).map_err(|error| self.unwritable(&error))
     }
 
-    /// Has all lines added so far on the disk; several threads may wait for that together.
+    /// Makes all lines appended so far durable; several threads may share one sync.
     ///
     /// # Errors
-    /// If the system cannot do that.
+    /// If the system call fails.
     pub(crate) fn settle(&self) -> Result<(), Failure> {
         let synced = match self.sync {
             true => storage::sync(&self.file),
@@ -88,7 +88,7 @@ impl JsonLines {
     }
 
     fn write(&self, mut lines: String) -> io::Result<()> {
-        // Where there are no locks, one call that writes at the end is all there is.
+        // Without locks, a single write call at the end must suffice.
         let is_locked = self.file.lock().is_ok();
         let written = storage::ends_without_line(&self.file).and_then(|is_cut| {
             if is_cut {
@@ -97,7 +97,7 @@ impl JsonLines {
             storage::write_all(&self.file, lines.as_bytes())
         });
         if is_locked {
-            // Closing the file does it, too.
+            // Closing the file unlocks it, too.
             let _ = self.file.unlock();
         }
         written

@@ -1,17 +1,18 @@
-//! The mark of a result of `compensate`: the stand's response is no longer in it, and no verb divides it out again.
+//! Mark of a result of `compensate`, which no longer contains the stand's response and must not be compensated
+//! again.
 
 use crate::failure::{ErrorCode, Failure};
 
-/// Beginning of the heading of a result of `compensate`.
+/// Start of the heading of a result of `compensate`.
 pub(crate) const COMPENSATED: &str = "compensated_";
 
-/// Whether a heading or the name of a field is that of a result of `compensate`, in any case.
+/// Whether a heading or field name is that of a result of `compensate`, ignoring case.
 pub(crate) fn names_compensated(name: &str) -> bool {
     let front = name.trim_start().get(..COMPENSATED.len());
     front.is_some_and(|front| front.eq_ignore_ascii_case(COMPENSATED))
 }
 
-/// The refusal of a result of `compensate` where a recorded signal is wanted.
+/// Failure for a result of `compensate` where a recorded signal is required.
 pub(crate) fn already_compensated(source: &str, name: &str) -> Failure {
     Failure::failed(
         ErrorCode::AlreadyCompensated,

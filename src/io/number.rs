@@ -1,4 +1,4 @@
-//! Decimal text to `f64`, exactly, for recorder logs.
+//! Exact conversion of decimal text to `f64`, for recorder logs.
 //!
 //! Numbers of up to 19 digits and a power of ten up to ±22 are built from their integer mantissa
 //! (W. D. Clinger, PLDI 1990: both factors are exact, so the one operation rounds correctly);
@@ -9,33 +9,35 @@ const EXACT_POWERS: [f64; 23] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16,
     1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
 ];
-/// Their reciprocals, correctly rounded.
+/// Their correctly rounded reciprocals.
 const INVERSE_POWERS: [f64; 23] = [
     1e0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14,
     1e-15, 1e-16, 1e-17, 1e-18, 1e-19, 1e-20, 1e-21, 1e-22,
 ];
-/// Digits that fit a `u64` whatever they are.
+/// Number of digits that always fit in a `u64`.
 const MOST_DIGITS: usize = 19;
 /// Largest integer up to which every integer is an `f64`.
 const EXACT_MANTISSA: u64 = 1 << 53;
 
-/// Reads a number at `text[at..]`: its value and the position after it.
+/// Parses a number at `text[at..]`: its value and the position after it.
 ///
-/// `None` if no finite number begins there, or one with which instruments say that they have none. `text` may go on with anything after it.
+/// `None` if no finite number begins there, or one that instruments use for a missing value. Anything may follow the
+/// number.
 #[inline(always)]
 pub fn read(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
     read_as::<true>(text, at, decimal)
 }
 
-/// The same to within one unit of the last bit: it multiplies where [`read`] has to wait for a
-/// division. For time stamps, which are compared with a tolerance and copied as text.
+/// The same to within one unit in the last place: it multiplies where [`read`] needs a division.
+/// For time stamps, which are compared with a tolerance and copied as text.
 #[inline(always)]
 pub fn read_nearly(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
     read_as::<false>(text, at, decimal)
 }
 
-/// Reads a number at `text[at..]` as its difference to a whole one, rounded once: of 1710250000.123456 to 1710250000 it is
-/// 0.123456, where the number itself has no more than 2.4e-7 in an `f64`. And the position after it.
+/// Parses a number at `text[at..]` as its difference from an integer, rounded once: for 1710250000.123456 and
+/// 1710250000 it is 0.123456, where the number itself has a resolution of 2.4e-7 as an `f64`. Also returns the position
+/// after it.
 pub fn read_after(text: &[u8], at: usize, decimal: u8, origin: i64) -> Option<(f64, usize)> {
     let (parts, count, place) = parts(text, at, decimal)?;
     let exact = || {
@@ -59,7 +61,7 @@ pub fn read_after(text: &[u8], at: usize, decimal: u8, origin: i64) -> Option<(f
     Some((exact(), place))
 }
 
-/// A number without the decimals behind its nineteenth digit; `None` if it has none to spare.
+/// A number without the decimals after its nineteenth digit; `None` if there are none.
 #[cold]
 fn without_last_digits(number: &[u8], decimal: u8) -> Option<Vec<u8>> {
     let point = number.iter().position(|byte| *byte == decimal)?;
@@ -75,7 +77,7 @@ fn without_last_digits(number: &[u8], decimal: u8) -> Option<Vec<u8>> {
     Some([&number[..=point + kept], &number[point + 1 + decimals..]].concat())
 }
 
-/// The digits of a number at `text[at..]`, how many they are, and the position after it.
+/// The digits of a number at `text[at..]`, their count, and the position after it.
 #[inline(always)]
 fn parts(text: &[u8], at: usize, decimal: u8) -> Option<(Parts, usize, usize)> {
     let mut place = at;
@@ -130,7 +132,7 @@ fn read_as<const EXACT: bool>(text: &[u8], at: usize, decimal: u8) -> Option<(f6
     Some((value, place))
 }
 
-/// A decimal number taken apart: `±mantissa · 10^exponent`.
+/// A decomposed decimal number: `±mantissa · 10^exponent`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Parts {
     pub(crate) negative: bool,
@@ -139,7 +141,7 @@ pub(crate) struct Parts {
 }
 
 impl Parts {
-    /// The nearest `f64`; `None` if more than one rounding would stand between.
+    /// The nearest `f64`; `None` if that would need more than one rounding.
     #[inline(always)]
     pub(crate) fn exactly(self) -> Option<f64> {
         let power = *EXACT_POWERS.get(self.exponent.unsigned_abs() as usize)?;
@@ -150,7 +152,7 @@ impl Parts {
         })
     }
 
-    /// The same to within one unit of the last bit, without a division.
+    /// The same to within one unit in the last place, without a division.
     #[inline(always)]
     pub(crate) fn nearly(self) -> Option<f64> {
         let place = self.exponent.unsigned_abs() as usize;
@@ -169,17 +171,17 @@ impl Parts {
 }
 
 /// Value of the `count` digits (1 to 8) at `text[at..]`; `None` if they are not all digits. Eight bytes
-/// have to be there.
+/// must be available.
 #[inline(always)]
 pub(crate) fn run(text: &[u8], at: usize, count: usize) -> Option<u64> {
     let eight = text.get(at..at + 8)?;
     let chunk = u64::from_le_bytes(eight.try_into().expect("eight bytes")) ^ ASCII_ZEROS;
-    // What follows the digits is pushed out; zeros come before them.
+    // Shifts out what follows the digits; zeros precede them.
     let chunk = chunk << (8 * (8 - count));
     are_digits(chunk).then(|| eight_digits(chunk))
 }
 
-/// Value of the one digit at `text[at]`.
+/// Value of one digit at `text[at]`.
 #[inline(always)]
 pub(crate) fn digit(text: &[u8], at: usize) -> Option<u64> {
     let digit = text.get(at)?.wrapping_sub(b'0');
@@ -200,8 +202,8 @@ pub(crate) fn two_digit_exponent(text: &[u8], at: usize) -> Option<i32> {
     Some(if sign == b'-' { -value } else { value })
 }
 
-/// Reads the digits at `text[at..]` onto `mantissa` (wrapping: the caller counts the digits): eight at
-/// a time while there are as many, then one by one. Short runs are quickest one by one.
+/// Appends the digits at `text[at..]` to `mantissa` (wrapping: the caller counts the digits): eight at
+/// a time while there are as many, then one by one. Short runs are fastest one by one.
 #[inline(always)]
 fn many_digits(text: &[u8], mut at: usize, mut mantissa: u64) -> (u64, usize) {
     while let Some(eight) = text.get(at..at + 8) {
@@ -232,14 +234,14 @@ fn few_digits(text: &[u8], mut at: usize, mut mantissa: u64) -> (u64, usize) {
 /// Eight times the byte of the digit 0.
 const ASCII_ZEROS: u64 = 0x3030_3030_3030_3030;
 
-/// Whether all eight bytes are 0 to 9, as ASCII digits are once [`ASCII_ZEROS`] are taken off. Adding
-/// 0x76 sets the high bit of anything larger.
+/// Whether all eight bytes are 0 to 9, as for ASCII digits minus [`ASCII_ZEROS`]. Adding 0x76 sets
+/// the high bit of anything larger.
 #[inline(always)]
 fn are_digits(chunk: u64) -> bool {
     (chunk.wrapping_add(0x7676_7676_7676_7676) | chunk) & 0x8080_8080_8080_8080 == 0
 }
 
-/// Value of eight digits of a byte each, the first in the lowest: pairs, then fours, then eight.
+/// Value of eight digits, one per byte, the first in the lowest: pairs, then fours, then eight.
 #[inline]
 fn eight_digits(chunk: u64) -> u64 {
     let pairs = (chunk.wrapping_mul(10).wrapping_add(chunk >> 8)) & 0x00FF_00FF_00FF_00FF;
@@ -284,13 +286,13 @@ fn slow(text: &[u8], decimal: u8) -> Option<f64> {
     (value.is_finite() && !is_instruments_mark(value)).then_some(value)
 }
 
-/// Numbers with which instruments say that they have none: 9.91e37 is not a number, ±9.9e37 is over the range
+/// Numbers that instruments use for missing values: 9.91e37 is not a number, ±9.9e37 is over the range
 /// (SCPI-1999, volume 1, 7.2.1.4 and 7.2.1.5).
 const INSTRUMENTS_MARKS: [f64; 2] = [9.9e37, 9.91e37];
-/// Relative deviation of such a mark that went through an `f32` or was written in few digits.
+/// Relative deviation of such a mark after conversion to an `f32` or rounding to few digits.
 const OF_MARKS: f64 = 1e-5;
 
-/// Whether an instrument says with a number that it has none, or that the signal is over its range.
+/// Whether a number means a missing or out-of-range value of an instrument.
 #[must_use]
 pub fn is_instruments_mark(value: f64) -> bool {
     INSTRUMENTS_MARKS
@@ -298,7 +300,7 @@ pub fn is_instruments_mark(value: f64) -> bool {
         .any(|mark| (value.abs() / mark - 1.0).abs() < OF_MARKS)
 }
 
-/// Reads a whole cell, spaces around it allowed.
+/// Parses a whole cell, with optional spaces around it.
 pub fn cell(text: &str, decimal: u8) -> Option<f64> {
     let text = text.trim().as_bytes();
     read(text, 0, decimal)

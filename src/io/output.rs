@@ -1,4 +1,4 @@
-//! Outputs that appear whole or not at all.
+//! Atomic outputs: complete or absent.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -18,19 +18,19 @@ static IS_STDOUT_USED: AtomicBool = AtomicBool::new(false);
 /// A file that no output of this process may replace.
 static KEPT_FREE: OnceLock<PathBuf> = OnceLock::new();
 
-/// Most links that lead to one file.
+/// Maximum number of links followed.
 const LINKS: usize = 40;
 
-/// How files are written.
+/// Policy for writing files.
 #[derive(Debug, Clone, Copy)]
 pub struct Policy {
-    /// Whether a file that exists is replaced.
+    /// Whether an existing file is replaced.
     pub replace: bool,
-    /// Whether a file is on the disk before it takes its name.
+    /// Whether a file is synced before it is renamed.
     pub sync: bool,
 }
 
-/// An output: standard output, a device, or a file that takes its name when it is complete.
+/// An output: standard output, a device, or a file that is renamed when it is complete.
 pub struct Output {
     place: PathBuf,
     name: String,
@@ -39,7 +39,7 @@ pub struct Output {
 
 enum Kind {
     Stdout(io::Stdout),
-    /// A pipe or device that exists: nothing to rename.
+    /// An existing pipe or device, without renaming.
     Device(File),
     File {
         part: NamedTempFile,
@@ -48,7 +48,7 @@ enum Kind {
     },
 }
 
-/// Keeps a file from being replaced by any output of this process; the first one that is named.
+/// Protects a file from being replaced by any output of this process; only the first call counts.
 pub(crate) fn keep_free(path: &Path) {
     let _ = KEPT_FREE.set(path.to_owned());
 }
@@ -64,11 +64,11 @@ impl Output {
         }
     }
 
-    /// Opens an output. `taken` are the files that it must not replace: the inputs, with `-` for standard input, and the other
-    /// outputs.
+    /// Opens an output. `taken` are the files that it must not replace: the inputs, with `-` for standard input, and
+    /// the other outputs.
     ///
     /// # Errors
-    /// If the output is one of them, exists and may not be replaced, or its folder cannot be written.
+    /// If the output is one of them, exists and may not be replaced, or its folder is not writable.
     pub fn open(place: Option<&Path>, policy: Policy, taken: &[&Path]) -> Result<Self, Failure> {
         let Some(path) = place.filter(|path| !is_dash(path)) else {
             return Ok(Self::stdout());
@@ -87,7 +87,7 @@ impl Output {
             )
             .at(&name));
         }
-        // A link is followed, so that it stays one; also one that leads nowhere counts as existing.
+        // A link is followed and preserved; a dangling one also counts as existing.
         let exists = std::fs::symlink_metadata(path).is_ok();
         let kind = match std::fs::metadata(path) {
             Ok(meta) if meta.is_dir() => {
@@ -113,7 +113,7 @@ impl Output {
                 let part =
                     parts::create_in(folder_of(&path)).map_err(|e| folder_failure(&path, &e))?;
                 if let Ok(meta) = found {
-                    // What is replaced hands on its permissions.
+                    // The permissions of a replaced file are preserved.
                     let kept = part.as_file().set_permissions(meta.permissions());
                     kept.map_err(|e| Failure::writing(&name, &e))?;
                 }
@@ -130,21 +130,21 @@ impl Output {
     /// Writes bytes.
     ///
     /// # Errors
-    /// [`Failure::ClosedPipe`] if nobody reads any more, or a failure that names the output.
+    /// [`Failure::ClosedPipe`] if the reader has gone, or a failure that names the output.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), Failure> {
         let written = self.write_all(bytes);
         written.map_err(|error| Failure::writing(&self.name, &error))
     }
 
-    /// Completes the output: a file gets its name now.
+    /// Completes the output: a file is renamed now.
     ///
     /// # Errors
-    /// As [`Output::write`].
+    /// As for [`Output::write`].
     pub fn finish(self) -> Result<(), Failure> {
         finish_all([self])
     }
 
-    /// Does whatever can fail before the file takes its name.
+    /// Does everything that can fail before the file is renamed.
     fn seal(&mut self) -> io::Result<()> {
         match &mut self.kind {
             Kind::Stdout(out) => out.flush(),
@@ -154,7 +154,7 @@ impl Output {
         }
     }
 
-    /// SHA-256 of what was written; `None` of what is no file.
+    /// SHA-256 of the bytes written; `None` if it is not a file.
     pub(crate) fn sum(&self) -> io::Result<Option<String>> {
         match &self.kind {
             Kind::File { part, .. } => sum::of_file(part.path()).map(Some),
@@ -162,12 +162,12 @@ impl Output {
         }
     }
 
-    /// Its path as given, `-` of standard output.
+    /// Its path as given, `-` for standard output.
     pub(crate) fn place(&self) -> &Path {
         &self.place
     }
 
-    /// Name for people.
+    /// Name for messages.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -195,19 +195,19 @@ impl Write for Output {
     }
 }
 
-/// Makes a folder for outputs, with those above it.
+/// Creates a folder for outputs, including its parents.
 ///
 /// # Errors
-/// If the system refuses.
+/// If the system call fails.
 pub(crate) fn make_folder(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Failure::writing(&folder.shown().to_string(), &error))
 }
 
-/// Completes the outputs of one run: all files get their names, or none does.
+/// Completes the outputs of one run: all files are renamed, or none.
 ///
 /// # Errors
-/// As [`Output::write`].
+/// As for [`Output::write`].
 pub fn finish_all(outputs: impl IntoIterator<Item = Output>) -> Result<(), Failure> {
     let mut outputs: Vec<Output> = outputs.into_iter().collect();
     for output in &mut outputs {
@@ -234,12 +234,12 @@ pub fn finish_all(outputs: impl IntoIterator<Item = Output>) -> Result<(), Failu
     done.iter().try_for_each(Renamed::settle)
 }
 
-/// A file that has taken its name.
+/// A renamed file.
 struct Renamed {
     path: PathBuf,
-    /// Whether there was nothing of that name before.
+    /// Whether nothing of that name existed before.
     is_new: bool,
-    /// What it replaced, under another name as long as that may have to come back.
+    /// The replaced file, kept under another name while it may have to be restored.
     replaced: Option<tempfile::TempPath>,
     sync: bool,
 }
@@ -260,18 +260,18 @@ impl Renamed {
         })
     }
 
-    /// Puts back what was there before.
+    /// Restores the previous state.
     fn undo(self) {
-        // The failure that led here is the one to tell.
+        // The original failure is the one to report.
         let _ = match self.replaced {
             Some(old) => storage::rename(old, &self.path, true),
             None if self.is_new => std::fs::remove_file(&self.path),
-            // Without a copy of the old file, the new one is all there is.
+            // Without a copy of the old file, only the new one exists.
             None => Ok(()),
         };
     }
 
-    /// Has the new name on the disk, too. Where folders cannot be opened or synced, the system does so in its time.
+    /// Syncs the new name. Where folders cannot be opened or synced, this is left to the system.
     fn settle(&self) -> Result<(), Failure> {
         let synced = match self.sync {
             true => storage::sync_folder(folder_of(&self.path)),
@@ -290,7 +290,7 @@ impl Renamed {
     }
 }
 
-/// A second name for a file that exists, removed when it is dropped; `None` where file systems have no such thing.
+/// A second name for an existing file, removed on drop; `None` if the file system does not support links.
 fn second_name(path: &Path) -> Option<tempfile::TempPath> {
     let part = parts::create_in(folder_of(path)).ok()?.into_temp_path();
     storage::link(path, &part).ok()?;
@@ -327,7 +327,7 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// The file that a name leads to, whether it is there or not.
+/// The target of a path after following links, whether it exists or not.
 pub(crate) fn end_of_links(path: &Path) -> PathBuf {
     let mut path = path.to_owned();
     for _ in 0..LINKS {
@@ -343,7 +343,7 @@ pub(crate) fn end_of_links(path: &Path) -> PathBuf {
     }
 }
 
-/// Whether an input or another output is the file of that path.
+/// Whether an input or another output is the same file as a path.
 fn is_same_file(other: &Path, path: &Path) -> bool {
     match is_dash(other) {
         true => is_stdin(path),
@@ -351,7 +351,8 @@ fn is_same_file(other: &Path, path: &Path) -> bool {
     }
 }
 
-/// Whether standard input is read from the file of that path. Only regular files are opened for that: a pipe would wait.
+/// Whether standard input is read from the file at a path. Only regular files are opened for that, as a pipe would
+/// block.
 fn is_stdin(path: &Path) -> bool {
     let is_file = std::fs::metadata(path).is_ok_and(|meta| meta.is_file());
     is_file
@@ -364,7 +365,8 @@ fn is_stdin(path: &Path) -> bool {
         }
 }
 
-/// Whether anything was written to standard output: a second JSON document there could not be parsed.
+/// Whether anything was written to standard output: a second JSON document there would make it
+/// unparsable.
 pub(crate) fn is_stdout_used() -> bool {
     IS_STDOUT_USED.load(Ordering::Relaxed)
 }
@@ -372,7 +374,7 @@ pub(crate) fn is_stdout_used() -> bool {
 /// Writes a text to standard output.
 ///
 /// # Errors
-/// As [`Output::write`].
+/// As for [`Output::write`].
 pub fn print(text: &str) -> Result<(), Failure> {
     let mut output = Output::stdout();
     output.write(text.as_bytes())?;

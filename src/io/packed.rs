@@ -1,13 +1,13 @@
-//! Compressed files: told by their first bytes, and unpacked as they are read.
+//! Compressed files: recognised by their first bytes, and decompressed on the fly.
 
 use std::io::{self, BufReader, Read};
 
-/// Most memory for the window that is copied from, in MiB: what `xz -9` and `zstd --ultra --long` need.
+/// Maximum memory of the decompression window, in MiB: as needed by `xz -9` and `zstd --ultra --long`.
 const WINDOW_MIB: u32 = 128;
 /// Bytes read from the file at a time.
 const PIECE: usize = 1 << 16;
 
-/// Bytes that tell the compression.
+/// Number of bytes that identify the compression.
 pub(super) const MAGIC: usize = 6;
 
 /// A compression.
@@ -19,7 +19,7 @@ pub(crate) enum Packing {
 }
 
 impl Packing {
-    /// That of a file that begins so, if it is compressed.
+    /// Compression of a file with these first bytes, if any.
     pub(super) fn of(head: &[u8]) -> Option<Self> {
         let begins: [(&[u8], Self); 3] = [
             (b"\x1f\x8b\x08", Self::Gzip),
@@ -30,7 +30,7 @@ impl Packing {
         found.map(|(_, packing)| *packing)
     }
 
-    /// Name for people, which is that of the program, too.
+    /// Name for messages, which is also that of the program.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Gzip => "gzip",
@@ -39,7 +39,7 @@ impl Packing {
         }
     }
 
-    /// What is in a file of that compression, the parts of several joined.
+    /// Content of a file with that compression, with several members joined.
     pub(super) fn unpack(
         self,
         packed: impl Read + Send + 'static,
@@ -64,7 +64,7 @@ impl Packing {
     }
 }
 
-/// The content of a compressed file.
+/// Content of a compressed file.
 struct Unpacked {
     packing: Packing,
     bytes: Box<dyn Read + Send>,
@@ -73,7 +73,7 @@ struct Unpacked {
 impl Read for Unpacked {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         self.bytes.read(bytes).map_err(|error| {
-            // What the system says of the file is no fault of its content.
+            // An error of the system is not a fault of the content.
             match error.raw_os_error().is_some() || error.kind() == io::ErrorKind::Interrupted {
                 true => error,
                 false => self.damaged(&error),
@@ -103,8 +103,8 @@ impl Unpacked {
 mod tests {
     use super::*;
 
-    /// "time_s,torque_n_m\n0,1\n", packed by gzip 1.12, zstd 1.5 and xz 5.4 is in `tests/recordings`; here, what is no
-    /// whole archive.
+    /// "time_s,torque_n_m\n0,1\n", packed by gzip 1.12, zstd 1.5 and xz 5.4, is in `tests/recordings`; incomplete
+    /// archives are tested here.
     #[test]
     fn an_archive_that_ends_early_is_no_end_of_its_content() {
         use std::io::Write;

@@ -1,4 +1,4 @@
-//! Temporary files of outputs that are not complete, and their removal when a run ends early.
+//! Temporary files of incomplete outputs, and their removal when a run ends early.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -12,11 +12,11 @@ use super::storage;
 
 /// Files to be removed if the run is interrupted.
 static OPEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
-/// Folders in which this run has looked for files that others left.
+/// Folders in which this run has looked for orphaned files.
 static TIDIED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-/// Files among which those that are gone are looked for.
+/// Number of open files from which on removed ones are purged from the list.
 const MOST_OPEN: usize = 256;
-/// How the names of all of them begin and end.
+/// Prefix and suffix of the names of all of them.
 const PREFIX: &str = ".torqcomp-";
 const SUFFIX: &str = ".part";
 
@@ -24,34 +24,34 @@ fn open() -> MutexGuard<'static, Vec<PathBuf>> {
     OPEN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Whether a folder has not been looked at before.
+/// Whether a folder has not been examined before.
 fn is_first_in(folder: &Path) -> bool {
     let mut tidied = TIDIED.lock().unwrap_or_else(PoisonError::into_inner);
     tidied.insert(folder.to_owned())
 }
 
-/// Removes what is not complete, and ends the process before any other file is made.
+/// Removes incomplete files, and exits before any other file is created.
 fn remove_open_and_exit(code: i32) -> ! {
     let mut open = open();
     for part in open.drain(..) {
-        // It may have got its name already, or be gone.
+        // It may have been renamed or removed already.
         let _ = std::fs::remove_file(part);
     }
     std::process::exit(code)
 }
 
-/// Has incomplete outputs removed when the run is told to end; the exit code is 128 and the number of the signal, as shells
-/// have it. A signal that is ignored at the start, as under `nohup`, stays ignored.
+/// Removes incomplete outputs when the run is terminated by a signal; the exit code is 128 plus the number of the
+/// signal, as in shells. A signal ignored at the start, as under `nohup`, stays ignored.
 ///
 /// # Errors
-/// If the system does not let signals be handled.
+/// If signals cannot be handled.
 #[cfg(unix)]
 pub fn remove_when_interrupted() -> io::Result<()> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXCPU, SIGXFSZ};
     let ends = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU];
     let ends = ends.into_iter().filter(|signal| !is_ignored(*signal));
     let mut signals = signal_hook::iterator::Signals::new(ends)?;
-    // The write beyond the limit then fails like any other.
+    // A write beyond the limit then fails like any other.
     signal_hook::flag::register(SIGXFSZ, std::sync::Arc::default())?;
     std::thread::Builder::new()
         .name("signals".to_owned())
@@ -63,16 +63,16 @@ pub fn remove_when_interrupted() -> io::Result<()> {
     Ok(())
 }
 
-/// Has incomplete outputs removed when the run is told to end; the exit code is 130.
+/// Removes incomplete outputs when the run is interrupted; the exit code is 130.
 ///
 /// # Errors
-/// If the system does not let that be handled.
+/// If interruptions cannot be handled.
 #[cfg(not(unix))]
 pub fn remove_when_interrupted() -> io::Result<()> {
     ctrlc::set_handler(|| remove_open_and_exit(130)).map_err(io::Error::other)
 }
 
-/// Whether this process ignores a signal, as far as the system says.
+/// Whether this process ignores a signal, as far as the system reports it.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -81,8 +81,8 @@ fn is_ignored(signal: i32) -> bool {
     mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
-/// A file in a folder that gets another name when it is complete, and is removed otherwise. Its own name says which process
-/// made it and when.
+/// A file in a folder that is renamed when it is complete, and removed otherwise. Its temporary name identifies the
+/// process and time of its creation.
 pub fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
     let owner = Owner::of_this_process();
     if is_first_in(folder) {
@@ -94,7 +94,7 @@ pub fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).suffix(SUFFIX);
     set_permissions(&mut builder);
-    // Held over the creation, so that an interruption meets all files or prevents them.
+    // Held during creation, so that an interruption sees all files or prevents them.
     let mut open = open();
     let part = storage::create(&builder, folder)?;
     if open.len() >= MOST_OPEN {
@@ -104,7 +104,7 @@ pub fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
     Ok(part)
 }
 
-/// The finished file gets the permissions of any other new file.
+/// Gives the finished file the permissions of any other new file.
 #[cfg(unix)]
 fn set_permissions(builder: &mut tempfile::Builder<'_, '_>) {
     use std::os::unix::fs::PermissionsExt;
@@ -114,9 +114,9 @@ fn set_permissions(builder: &mut tempfile::Builder<'_, '_>) {
 #[cfg(not(unix))]
 fn set_permissions(_: &mut tempfile::Builder<'_, '_>) {}
 
-/// Who makes a temporary file.
+/// Creator of a temporary file.
 struct Owner {
-    /// The machine and, where it has several, its space of process numbers; no hyphens.
+    /// The machine and, if it has several, its PID namespace; without hyphens.
     place: String,
     process: u32,
 }
@@ -140,8 +140,8 @@ impl Owner {
     }
 }
 
-/// Removes the temporary files of processes that are surely gone: of this machine and user, with a number that no process
-/// has. Failing to is no failure of the run.
+/// Removes the temporary files of processes that have certainly ended: of this machine and user, with a PID that no
+/// process has. Failure to do so does not fail the run.
 #[cfg(target_os = "linux")]
 fn remove_orphans(folder: &Path, owner: &Owner) {
     use std::os::unix::fs::MetadataExt;
@@ -161,7 +161,7 @@ fn remove_orphans(folder: &Path, owner: &Owner) {
         };
         let is_number = !process.is_empty() && process.bytes().all(|b| b.is_ascii_digit());
         let is_gone = is_number && !Path::new("/proc").join(process).exists();
-        // Processes of others may be hidden.
+        // Processes of other users may be hidden.
         let is_ours = file.metadata().is_ok_and(|meta| meta.uid() == this.uid());
         if is_gone && is_ours {
             let _ = std::fs::remove_file(file.path());

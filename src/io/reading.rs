@@ -1,4 +1,4 @@
-//! How a recording is read, as far as its file leaves that open.
+//! Options for reading a recording, where its file is ambiguous.
 
 use clap::{Args, ValueEnum};
 
@@ -7,7 +7,7 @@ use torqcomp_model::Kind;
 
 use crate::unit::NamedUnit;
 
-/// How cells are separated.
+/// Separation of cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Delimiter {
     /// By one such byte.
@@ -63,7 +63,7 @@ pub struct Reading {
     pub any_steps: bool,
 }
 
-/// The ends of a range of time as written; what they mean the record's time axis says.
+/// The ends of a time range as written; their meaning depends on the record's time axis.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TimeRange {
     /// Its first time.
@@ -72,7 +72,7 @@ pub struct TimeRange {
     pub to: Option<String>,
 }
 
-/// What a sample of full scale stands for.
+/// Meaning of a full-scale sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FullScale {
     /// Its value in the unit.
@@ -104,12 +104,12 @@ pub struct DialectOverride {
 }
 
 impl Reading {
-    /// Whether a part of the record is read, or something is added to it: both need the whole of it in memory.
+    /// Whether part of the record is read, or something is added to it: both need the whole record in memory.
     pub(crate) fn is_partial(&self) -> bool {
         self.range.is_some() || self.fill.is_some_and(|fill| fill != Fill::Refuse)
     }
 
-    /// Whether what lies before a time is left out.
+    /// Whether samples before a time are left out.
     pub(crate) fn starts_later(&self) -> bool {
         let range = self.range.as_ref();
         range.is_some_and(|range| range.from.is_some())
@@ -146,12 +146,12 @@ pub struct ChannelChoice {
     pub flags: Flags,
 }
 
-/// The flags of a verb that choose a channel and give its unit, for messages.
+/// The options of a command that select a channel and give its unit, for messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Flags {
-    /// That of the channel.
+    /// Option for the channel.
     pub channel: &'static str,
-    /// That of its unit; `None` if the verb has none.
+    /// Option for its unit; `None` if there is none.
     pub unit: Option<&'static str>,
 }
 
@@ -171,7 +171,7 @@ impl Default for ChannelChoice {
 }
 
 impl ChannelChoice {
-    /// The channel and unit that a verb's own flags give.
+    /// Channel and unit given by a command's own options.
     #[must_use]
     pub fn of(flags: Flags, channel: Option<&str>, unit: Option<&str>) -> Self {
         Self {
@@ -183,7 +183,7 @@ impl ChannelChoice {
         }
     }
 
-    /// The channel that a flag of the verb names, with its unit if another flag gives it.
+    /// The channel named by an option of the command, with its unit if given by another option.
     #[must_use]
     pub fn named([channel, unit]: [&'static str; 2], name: &str, unit_text: Option<&str>) -> Self {
         let flags = Flags {
@@ -193,7 +193,7 @@ impl ChannelChoice {
         Self::of(flags, Some(name), unit_text)
     }
 
-    /// The channels that `--applied` and `--measured` name, each with its unit if one is given.
+    /// The channels named by `--applied` and `--measured`, each with its unit if given.
     #[must_use]
     pub fn applied_and_measured(names: [&str; 2], units: [Option<&str>; 2]) -> [Self; 2] {
         [
@@ -202,7 +202,7 @@ impl ChannelChoice {
         ]
     }
 
-    /// The channel that `--measured` names, with its unit if one is given.
+    /// The channel named by `--measured`, with its unit if given.
     #[must_use]
     pub fn measured_alone(name: &str, unit: Option<&str>) -> Self {
         Self::named(["--measured", "--measured-unit"], name, unit)
@@ -222,7 +222,7 @@ pub(crate) fn frequency(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A frequency above zero that a clock could have: the times of its samples are numbers.
+/// A positive frequency that is plausible for a clock, so that the times of its samples are finite.
 pub(crate) fn positive_frequency(text: &str) -> Result<f64, String> {
     match frequency(text)? {
         0.0 => Err("expected a frequency greater than zero".to_owned()),
@@ -235,7 +235,7 @@ fn full_scale(text: &str) -> Result<FullScale, String> {
     let text = text.trim();
     let is_number = |c: char| c.is_ascii_digit() || "+-.".contains(c);
     let end = text.find(|c| !is_number(c)).unwrap_or(text.len());
-    // Of 1e3, the letter belongs to the number.
+    // The letter in 1e3 belongs to the number.
     let power = text[end..].strip_prefix(['e', 'E']).map_or(0, |rest| {
         let digits = rest.find(|c| !is_number(c)).unwrap_or(rest.len());
         if digits > 0 { digits + 1 } else { 0 }

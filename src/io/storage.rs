@@ -1,4 +1,5 @@
-//! Files: opened, read, written, synced and named here and nowhere else, so that tests reach every one of these calls.
+//! All file system calls: opening, reading, writing, syncing and renaming, in one place so that tests can intercept
+//! every one of them.
 
 use std::fs::{File, Metadata};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -8,7 +9,7 @@ use tempfile::{NamedTempFile, TempPath};
 
 use super::fault::{Call, check, limit};
 
-/// A file or stream that is read; a call that a signal interrupts is repeated.
+/// A file or stream being read; an interrupted call is repeated.
 #[derive(Debug)]
 pub struct Stored<R>(R);
 
@@ -65,13 +66,13 @@ pub fn read_to_string(path: &Path) -> io::Result<String> {
     Ok(text)
 }
 
-/// Opens what is there for writing.
+/// Opens an existing file for writing.
 pub(super) fn open_for_writing(path: &Path) -> io::Result<File> {
     check(Call::Open)?;
     File::options().write(true).open(path)
 }
 
-/// Opens a file for writing at its end, and for reading, and makes it if it is not there.
+/// Opens a file for appending and reading, creating it if necessary.
 pub(crate) fn open_at_end(path: &Path) -> io::Result<File> {
     check(Call::Open)?;
     File::options()
@@ -81,7 +82,7 @@ pub(crate) fn open_at_end(path: &Path) -> io::Result<File> {
         .open(path)
 }
 
-/// The first bytes of a file, at most so many; none of a pipe or device.
+/// The first bytes of a file, at most `most`; empty for a pipe or device.
 pub(crate) fn first_bytes(mut file: &File, most: usize) -> io::Result<Vec<u8>> {
     let mut first = Vec::new();
     if has_bytes(file)? {
@@ -91,7 +92,7 @@ pub(crate) fn first_bytes(mut file: &File, most: usize) -> io::Result<Vec<u8>> {
     Ok(first)
 }
 
-/// Whether the last line of a file has no end; an empty one has no line, nor has a pipe or device.
+/// Whether the last line of a file has no line end; false for an empty file, a pipe or a device.
 pub(crate) fn ends_without_line(mut file: &File) -> io::Result<bool> {
     if !has_bytes(file)? {
         return Ok(false);
@@ -107,7 +108,7 @@ fn has_bytes(file: &File) -> io::Result<bool> {
     Ok(meta.is_file() && meta.len() > 0)
 }
 
-/// Writes all bytes at the end of a file.
+/// Appends all bytes to a file.
 pub(crate) fn write_all(mut file: &File, mut bytes: &[u8]) -> io::Result<()> {
     while !bytes.is_empty() {
         match write(&mut file, bytes) {
@@ -129,13 +130,13 @@ pub(super) fn create(
     builder.tempfile_in(folder)
 }
 
-/// Writes as many of the bytes as one call does.
+/// Writes as many of the bytes as one call accepts.
 pub(super) fn write(to: &mut impl Write, bytes: &[u8]) -> io::Result<usize> {
     let most = limit(Call::Write, bytes.len())?;
     to.write(&bytes[..most])
 }
 
-/// Has the names in a folder on the disk, where the system can do that.
+/// Syncs the names in a folder, if supported by the system.
 pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
     use io::ErrorKind::{InvalidInput, PermissionDenied, Unsupported};
     match open_folder(folder).and_then(|folder| sync(&folder)) {
@@ -151,7 +152,7 @@ fn open_folder(folder: &Path) -> io::Result<File> {
     Stored::open(folder).map(|folder| folder.0)
 }
 
-/// Windows opens a folder only with this flag, and syncs only what may be written.
+/// Windows opens a folder only with this flag, and syncs only writable handles.
 #[cfg(windows)]
 fn open_folder(folder: &Path) -> io::Result<File> {
     use std::os::windows::fs::OpenOptionsExt;
@@ -164,13 +165,13 @@ fn open_folder(folder: &Path) -> io::Result<File> {
         .open(folder)
 }
 
-/// Has a file on the disk.
+/// Syncs a file.
 pub(crate) fn sync(file: &File) -> io::Result<()> {
     check(Call::Sync)?;
     file.sync_all()
 }
 
-/// Gives a temporary file its name, in place of what has that name or only if nothing has.
+/// Renames a temporary file, replacing an existing file or only if there is none.
 pub(super) fn rename(part: TempPath, path: &Path, replace: bool) -> io::Result<()> {
     check(Call::Rename)?;
     let renamed = match replace {
@@ -180,14 +181,14 @@ pub(super) fn rename(part: TempPath, path: &Path, replace: bool) -> io::Result<(
     renamed.map_err(|error| error.error)
 }
 
-/// Gives a file that exists the name of a temporary file, too.
+/// Links an existing file under the name of a temporary file.
 pub(super) fn link(path: &Path, part: &TempPath) -> io::Result<()> {
     check(Call::Link)?;
     std::fs::remove_file(part)?;
     std::fs::hard_link(path, part)
 }
 
-/// A file without a name in the folder for temporary files, gone with the process.
+/// An anonymous file in the folder for temporary files, removed with the process.
 #[derive(Debug)]
 pub struct Scratch(Stored<File>);
 
@@ -204,7 +205,7 @@ impl Scratch {
     /// Reads the bytes at an offset.
     ///
     /// # Errors
-    /// Those of the system, and if there are fewer.
+    /// Those of the system, and if there are fewer bytes.
     pub fn read_at(&mut self, offset: u64, bytes: &mut [u8]) -> io::Result<()> {
         self.0.seek(SeekFrom::Start(offset))?;
         self.0.read_exact(bytes)

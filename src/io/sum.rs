@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 
 use super::storage::Stored;
 
-/// Bytes that are read at a time.
+/// Number of bytes read at a time.
 const PIECE: usize = 1 << 16;
 
 /// SHA-256 of a file, as 64 hexadecimal digits.

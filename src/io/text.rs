@@ -1,20 +1,20 @@
-//! Text that is put together from many short pieces.
+//! Text assembled from many short pieces.
 
 use super::digits::{self, Decimal, Digits};
 
-/// Longest piece that is copied with a fixed length.
+/// Longest piece copied with a fixed length.
 const SHORT: usize = 32;
-/// Room that is kept free at the end.
+/// Free space kept at the end.
 const ROOM: usize = digits::ROOM;
 
-/// What is copied for a short piece, unless the source ends before.
+/// The copy for a short piece, unless the source ends before.
 #[inline(always)]
 fn short_piece(source: &[u8], offset: usize) -> Option<&[u8; SHORT]> {
     source.get(offset..)?.first_chunk()
 }
 
-/// A growing text. Pieces are copied with a fixed length, which is quicker than the right one; what
-/// that puts after their end is overwritten by the next piece.
+/// A growing text. Pieces are copied with a fixed length, which is faster than the exact one; the
+/// surplus is overwritten by the next piece.
 #[derive(Debug, Default)]
 pub struct Text {
     bytes: Vec<u8>,
@@ -22,7 +22,7 @@ pub struct Text {
 }
 
 impl Text {
-    /// Empties the text, keeping its memory.
+    /// Clears the text, keeping its memory.
     pub fn clear(&mut self) {
         self.length = 0;
     }
@@ -46,7 +46,7 @@ impl Text {
         self.length += digits::put(self.room(), value, digits);
     }
 
-    /// Appends a number of nanoseconds as seconds, every digit of it.
+    /// Appends nanoseconds as seconds with all digits.
     pub fn seconds(&mut self, nanoseconds: i64) {
         const PER_SECOND: u64 = 1_000_000_000;
         let magnitude = nanoseconds.unsigned_abs();
@@ -78,7 +78,7 @@ impl Text {
         self.copy(&text, 0, length);
     }
 
-    /// Appends a number that was taken apart.
+    /// Appends a decomposed number.
     #[inline(always)]
     pub fn decimal(&mut self, decimal: &Decimal) {
         self.length += decimal.put(self.room());
@@ -87,7 +87,7 @@ impl Text {
     /// Appends `source[offset..offset + length]`, a comma, a number and a line feed.
     ///
     /// # Panics
-    /// If the source is shorter than that.
+    /// If the source is shorter.
     #[inline(always)]
     pub fn row(&mut self, source: &[u8], offset: usize, length: usize, decimal: &Decimal) {
         let Some(piece) = short_piece(source, offset).filter(|_| length < SHORT) else {
@@ -117,7 +117,7 @@ impl Text {
     /// Appends `source[offset..offset + length]`.
     ///
     /// # Panics
-    /// If the source is shorter than that.
+    /// If the source is shorter.
     #[inline]
     pub fn copy(&mut self, source: &[u8], offset: usize, length: usize) {
         match short_piece(source, offset) {

@@ -1,4 +1,4 @@
-//! Channels that are the same, or multiples of each other, within a file and across files.
+//! Channels that are equal to, or multiples of each other, within a file and across files.
 
 use torqcomp_dsp::quality::copies::{Portrait, Relation, relation};
 
@@ -7,20 +7,20 @@ use crate::print::rounded;
 use crate::recording::{Channel, Recording};
 use crate::warning::Warning;
 
-/// A channel among those that are compared.
+/// A channel to be compared.
 struct Seen<'a> {
     label: String,
     channel: &'a Channel,
     portrait: Portrait<'a>,
 }
 
-/// A channel that others follow from.
+/// A channel from which others follow.
 struct Family<'a> {
     first: Seen<'a>,
     others: Vec<(Seen<'a>, Relation)>,
 }
 
-/// The warnings about channels of one file that follow from each other, each with the names of all of
+/// Warnings about channels of one file that follow from each other, each with the names of all of
 /// them.
 #[must_use]
 pub fn within(recording: &Recording) -> Vec<(Warning, Vec<String>)> {
@@ -92,7 +92,7 @@ fn follows(first: &str, channel: &Channel, relation: &Relation) -> String {
     format!("{text} {sign} {offset}")
 }
 
-/// The warnings about channels of different files that hold the same samples.
+/// Warnings about channels of different files with equal samples.
 #[must_use]
 pub fn across(recordings: &[&Recording]) -> Vec<Warning> {
     let portraits: Vec<Vec<Seen>> = recordings.iter().map(|r| seen(r)).collect();
@@ -123,7 +123,7 @@ pub fn across(recordings: &[&Recording]) -> Vec<Warning> {
     found
 }
 
-/// The channels that say enough to be compared.
+/// The channels suitable for comparison.
 fn seen(recording: &Recording) -> Vec<Seen<'_>> {
     let labels = labels(&recording.channels);
     let channels = recording.channels.iter().zip(labels);

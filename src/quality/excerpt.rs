@@ -1,4 +1,4 @@
-//! What is wrong with a record that a verb works on, told from as much of it as may be kept.
+//! Faults of a record used by a command, from as much of it as is kept.
 
 use torqcomp_dsp::quality::streamed::Faults;
 
@@ -7,32 +7,32 @@ use crate::recording::TimeAxis;
 use crate::recording::moment::Moment;
 use crate::warning::Warning;
 
-/// Samples that are kept of a record that goes by as a stream, and looked at.
+/// Samples kept of a streamed record.
 pub const OF_STREAM: usize = 1 << 16;
-/// Samples that are looked at of a record that is gone through several times.
+/// Samples used of a record that is read several times.
 pub const OF_PASSES: usize = 1 << 18;
 
-/// The record that an excerpt is from.
+/// The record of an excerpt.
 #[derive(Debug, Clone, Copy)]
 pub struct Of<'a> {
     /// Name of the channel.
     pub name: &'a str,
-    /// Unit in which its samples are said.
+    /// Unit in which its samples are reported.
     pub unit: &'a str,
-    /// That unit for each unit of the samples.
+    /// Number of these units per unit of the samples.
     pub scale: f64,
-    /// Samples a second.
+    /// Sampling rate in Hz.
     pub rate_hz: f64,
     /// Time of the first sample.
     pub start: Moment,
-    /// Samples in all.
+    /// Total number of samples.
     pub samples: usize,
-    /// Clipping, standstills and spikes of all of them.
+    /// Clipping, standstills and spikes in all samples.
     pub faults: Faults,
 }
 
-/// The warnings of [`super::warnings`] about the first samples of a record, clipping, standstills and spikes in all of it; that
-/// it has more is said of the others.
+/// The warnings of [`super::warnings`] about the first samples of a record, with clipping, standstills and spikes in
+/// all of it; the other warnings mention that the record is longer.
 ///
 /// ```
 /// use torqcomp::recording::moment::Moment;

@@ -1,7 +1,7 @@
-//! What is wrong with a recording, in words and with stable codes.
+//! Faults of a recording, as text with stable codes.
 //!
-//! The criteria are those of [`torqcomp_dsp::quality`]; here they are applied to the channels and time
-//! axes of a recording. `docs/inspect.md` lists the codes.
+//! The criteria are those of [`torqcomp_dsp::quality`], applied here to the channels and time axes of
+//! a recording. `docs/inspect.md` lists the codes.
 
 pub mod copies;
 pub mod excerpt;
@@ -19,9 +19,9 @@ use crate::warning::Warning;
 pub use samples::{Findings, clipped_ends};
 pub use time::TimeFindings;
 
-/// The warnings about samples that a verb is going to use, and about their time axis.
+/// Warnings about samples to be used by a command, and about their time axis.
 ///
-/// `name` is that of the channel, `unit` the unit of the samples.
+/// `name` is the name of the channel, `unit` the unit of the samples.
 ///
 /// ```
 /// use torqcomp::quality;
@@ -36,10 +36,11 @@ pub fn warnings(name: &str, unit: &str, samples: &[f64], axis: &TimeAxis) -> Vec
     of_findings(name, unit, Findings::of(samples, axis.rate_hz), axis)
 }
 
-/// The same of what is known of the samples.
+/// The same from existing findings.
 fn of_findings(name: &str, unit: &str, mut findings: Findings, axis: &TimeAxis) -> Vec<Warning> {
     let mut found = TimeFindings::of(axis).warnings(&format!("\"{name}\""), axis);
-    // Here the lines are what is measured, most likely: a machine in step with the mains makes even multiples, hum hardly any.
+    // Here the lines are most likely the measured signal: a machine synchronous with the mains has even multiples, hum
+    // hardly any.
     let is_odd = |line: &MainsLine| line.order % 2 == 1;
     findings.mains = findings
         .mains
@@ -50,7 +51,7 @@ fn of_findings(name: &str, unit: &str, mut findings: Findings, axis: &TimeAxis) 
     found
 }
 
-/// Where channels that were sampled together are cut off.
+/// Warnings about clipping of channels sampled together.
 pub(crate) fn clipped(aligned: &AlignedChannels) -> Vec<Warning> {
     let axis = TimeAxis::uniform(aligned.rate_hz, aligned.start);
     let of_channel = |channel: &AlignedChannel| {
@@ -62,7 +63,7 @@ pub(crate) fn clipped(aligned: &AlignedChannels) -> Vec<Warning> {
     channels.filter_map(of_channel).flatten().collect()
 }
 
-/// The warning about channels that have one value only.
+/// Warning about constant channels.
 #[must_use]
 pub fn constant(channels: &[(&str, f64)]) -> Warning {
     let named = channels
@@ -77,7 +78,7 @@ pub fn constant(channels: &[(&str, f64)]) -> Warning {
     )
 }
 
-/// The warning about channels that are coarsely resolved.
+/// Warning about coarsely resolved channels.
 #[must_use]
 pub fn coarse(
     channels: &[(
@@ -103,7 +104,7 @@ pub fn coarse(
     )
 }
 
-/// `a; b; c`, the end left out if there are very many.
+/// `a; b; c`, truncated if there are very many.
 fn join(items: impl Iterator<Item = String>) -> String {
     const MOST: usize = 12;
     let items: Vec<String> = items.collect();
@@ -117,7 +118,7 @@ fn join(items: impl Iterator<Item = String>) -> String {
     )
 }
 
-/// A number with its unit, if that is known.
+/// A number with its unit, if known.
 pub(crate) fn with_unit(value: f64, unit: &str, digits: u32) -> String {
     let value = crate::print::rounded(value, digits);
     if unit.is_empty() {
@@ -127,7 +128,7 @@ pub(crate) fn with_unit(value: f64, unit: &str, digits: u32) -> String {
     }
 }
 
-/// Where a sample lies, for people: its time if that is known, or its number from 1.
+/// Position of a sample for a message: its time if known, or its number from 1.
 fn place(axis: &TimeAxis, index: usize) -> String {
     let stamp = axis.stamps_s.as_ref().and_then(|t| t.get(index).copied());
     let counted = || {
@@ -143,14 +144,14 @@ fn place(axis: &TimeAxis, index: usize) -> String {
     }
 }
 
-/// Unit of a channel as the file writes it; empty if it gives none.
+/// Unit of a channel as written in the file; empty if none.
 #[must_use]
 pub fn unit_of(channel: &Channel) -> &str {
     let known = channel.unit.as_ref().map(|unit| unit.text.as_str());
     channel.unit_text.as_deref().or(known).unwrap_or("")
 }
 
-/// Names of channels, told apart: with the segment, or the number of the channel where several of one
+/// Unambiguous names of channels: with the segment, or the number of the channel where several of one
 /// segment have the same name.
 #[must_use]
 pub fn labels(channels: &[Channel]) -> Vec<String> {

@@ -1,4 +1,4 @@
-//! The samples of a channel: what they show.
+//! Findings about the samples of a channel.
 
 use torqcomp_dsp::quality::clipping::{Clipping, Rail};
 use torqcomp_dsp::quality::finite::{NonFinite, non_finite};
@@ -15,18 +15,18 @@ use crate::print::{plural, rounded, short};
 use crate::recording::{Hole, HoleKind, TimeAxis};
 use crate::warning::Warning;
 
-/// Levels in the range below which a resolution is coarse: 8 bits.
+/// Number of levels below which a resolution is coarse: 8 bits.
 const COARSE: f64 = 256.0;
-/// Levels up to which a channel is a state, not a measurement.
+/// Number of levels up to which a channel is a state rather than a measurement.
 const STATES: usize = 4;
 
-/// Samples below which nothing is said of their resolution: a table of a few readings.
+/// Minimum number of samples for a statement about resolution; fewer are a table of readings.
 const FEWEST: usize = 100;
 
-/// Samples below which a channel of one value is nothing to wonder at.
+/// Number of samples below which a constant channel is not conspicuous.
 const FEW: usize = 10;
 
-/// What the samples of a channel show.
+/// Findings about the samples of a channel.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Findings {
     /// Number of samples.
@@ -37,28 +37,28 @@ pub struct Findings {
     pub mean: Option<f64>,
     /// Their standard deviation: rms without the mean.
     pub std: Option<f64>,
-    /// Samples that are no finite numbers.
+    /// Non-finite samples.
     pub non_finite: Option<NonFinite>,
-    /// Whether it is a straight line: a counter, a time axis.
+    /// Whether it is a straight line, such as a counter or time axis.
     pub is_straight: bool,
-    /// The value of a channel that has only one.
+    /// Value of a constant channel.
     pub constant: Option<f64>,
-    /// Where it is clipped.
+    /// Clipping.
     pub clipping: Option<Clipping>,
-    /// Where it stands still.
+    /// Intervals in which it is stuck.
     pub standstills: Option<Standstills>,
-    /// Samples that stand alone.
+    /// Isolated outliers.
     pub spikes: Option<Spikes>,
-    /// How often samples repeat.
+    /// Repeated samples.
     pub repeats: Option<Repeats>,
-    /// Its resolution.
+    /// Resolution.
     pub quantisation: Option<Quantisation>,
-    /// Mains lines; `None` also if they cannot be looked for.
+    /// Mains lines; `None` also if they cannot be searched for.
     pub mains: Option<Mains>,
 }
 
 impl Findings {
-    /// Looks at the samples of a channel.
+    /// Analyses the samples of a channel.
     #[must_use]
     pub fn of(samples: &[f64], rate_hz: Option<f64>) -> Self {
         let (mean, std) = mean_and_std(samples).unzip();
@@ -84,10 +84,10 @@ impl Findings {
         }
     }
 
-    /// The first samples of a record, whose clipping, standstills and spikes were looked for in all of it.
+    /// The same with clipping, standstills and spikes from the whole record.
     #[must_use]
     pub fn with(mut self, faults: &Faults) -> Self {
-        // A level under noise is looked for at the beginning only.
+        // A level under noise is only searched for at the beginning.
         let is_noisy = |c: &Clipping| {
             [c.low, c.high]
                 .iter()
@@ -100,7 +100,7 @@ impl Findings {
         self
     }
 
-    /// The value of a channel that has only one, if it had the chance of having others.
+    /// Value of a constant channel with enough samples to be conspicuous.
     #[must_use]
     pub fn dead(&self) -> Option<f64> {
         self.constant.filter(|_| self.samples >= FEW)
@@ -114,9 +114,8 @@ impl Findings {
             .filter(|_| self.samples >= FEWEST && !self.is_straight)
     }
 
-    /// The warnings about the channel alone, but for those that are said of several channels at once
-    /// ([`super::constant`], [`super::coarse`]). `holes` are the cells that held no number, as far as
-    /// they are known.
+    /// Warnings about this channel, except those combined for several channels ([`super::constant`],
+    /// [`super::coarse`]). `holes` are the non-numeric cells, as far as they are known.
     #[must_use]
     pub fn warnings(
         &self,
@@ -139,7 +138,7 @@ impl Findings {
                 .filter(|r| r.unexplained == Some(true))
                 .map(|r| repeated(name, &r, axis)),
         );
-        // Lines that may as well be orders of a shaft are listed, but are nothing to warn of.
+        // Lines that may be shaft orders are listed, but cause no warning.
         let hum_of = self.mains.as_ref().filter(|mains| mains.shaft_hz.is_none());
         found.extend(hum_of.map(|mains| hum(name, unit, mains)));
         found
@@ -191,7 +190,7 @@ fn non_finite_cells(name: &str, found: &NonFinite, axis: &TimeAxis, holes: &[Hol
     )
 }
 
-/// The warnings about a channel that is cut off.
+/// Warnings about clipping of a channel.
 pub fn clipped_ends(name: &str, unit: &str, found: &Clipping, axis: &TimeAxis) -> Vec<Warning> {
     let ends = [(found.low, "lowest"), (found.high, "highest")].into_iter();
     let warning = |(rail, end): (Option<Rail>, _)| Some(clipped(name, unit, end, &rail?, axis));

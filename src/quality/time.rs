@@ -1,4 +1,4 @@
-//! The time axis of a channel: what its stamps show.
+//! Findings about the time axis of a channel.
 
 use torqcomp_dsp::quality::broken_line::BrokenLine;
 use torqcomp_dsp::quality::is_straight;
@@ -13,24 +13,25 @@ use crate::recording::{
 };
 use crate::warning::Warning;
 
-/// Largest deviation of a step, as a part of it, in an axis that counts as uniform.
+/// Largest relative deviation of a step in an axis that counts as uniform.
 const UNIFORM: f64 = 0.01;
-/// A step backwards by more than this many usual ones is more than samples out of order.
+/// Number of typical steps backwards above which the clock was set back, rather than samples being
+/// out of order.
 const SET_BACK: f64 = 10.0;
 
-/// What a time axis shows.
+/// Findings about a time axis.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TimeFindings {
-    /// Its steps; `None` without stamps, or if none rises.
+    /// Its steps; `None` without stamps, or if none increases.
     pub steps: Option<Steps>,
-    /// What its stamps are rounded to, if that is all that is wrong with them.
+    /// Quantum of its stamps, if rounding is their only fault.
     pub rounded: Option<Rounded>,
-    /// The rate that the head of the file gives and the stamps contradict.
+    /// A rate in the file header that contradicts the stamps.
     pub contradiction: Option<Contradiction>,
 }
 
 impl TimeFindings {
-    /// Looks at an axis.
+    /// Analyses an axis.
     #[must_use]
     pub fn of(axis: &TimeAxis) -> Self {
         let Some(stamps_s) = &axis.stamps_s else {
@@ -60,7 +61,7 @@ impl TimeFindings {
         }
     }
 
-    /// The warnings; `whose` names the channels that the axis belongs to.
+    /// The warnings; `whose` names the channels of the axis.
     #[must_use]
     pub fn warnings(&self, whose: &str, axis: &TimeAxis) -> Vec<Warning> {
         let mut found: Vec<Warning> = missing(whose, axis).into_iter().collect();
@@ -83,7 +84,7 @@ impl TimeFindings {
         found.extend(backwards(whose, axis, steps));
         found.extend(repeated(whose, axis, steps));
         if axis.rate_hz.is_none() {
-            // Without a usual step, every step would be a gap.
+            // Without a typical step, every step would be a gap.
             return found;
         }
         found.extend(jumps(whose, axis, steps));
@@ -97,8 +98,8 @@ impl TimeFindings {
     }
 }
 
-/// A warning about a channel that is a time axis itself (in a unit of time, rising along a straight
-/// line), if the rate that the head of the file gives for it is another one.
+/// Warning about a channel that is a time axis itself (in a unit of time, rising along a straight
+/// line), if the rate in the file header contradicts it.
 #[must_use]
 pub fn stamps_in_channel(name: &str, channel: &Channel) -> Option<Warning> {
     let stated_hz = channel.axis.header_rate_hz?;
@@ -125,7 +126,7 @@ fn missing(whose: &str, axis: &TimeAxis) -> Option<Warning> {
     }
     let given = "what needs a rate refuses it unless one is given with --rate HZ, or the column of stamps with --time-column";
     let why = match axis.stamps_s.as_deref().map(Vec::as_slice) {
-        // A list that no message fills has nothing that a rate could be of.
+        // A list without messages has no rate.
         Some([]) => return None,
         Some(stamps) if falls(stamps) => REVERSED.to_owned(),
         Some(_) => format!("the time stamps have no usual step; {given}"),
@@ -135,7 +136,7 @@ fn missing(whose: &str, axis: &TimeAxis) -> Option<Warning> {
     Some(Warning::new("missing-rate", message))
 }
 
-/// `3 of …, the first at …`; nothing if there are none.
+/// `3 of …, the first at …`; `None` if there are none.
 fn counted(events: &Events) -> Option<(&Event, &Event)> {
     events.listed.first().zip(events.longest.as_ref())
 }

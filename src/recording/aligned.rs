@@ -1,4 +1,4 @@
-//! Channels of one file on one uniform time axis, for the verbs that need records as a whole.
+//! Channels of one file on a common uniform time axis, for commands that need whole records.
 
 use std::sync::Arc;
 
@@ -14,11 +14,11 @@ use crate::print;
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
-/// Largest distance of the stamps of two channels that count as the same, in steps.
+/// Largest difference of the stamps of two channels that count as equal, in steps.
 const SAME_STAMP: f64 = 0.05;
-/// Largest relative difference of rates that resampling may bridge.
+/// Largest relative difference of rates that can be resampled.
 const SIMILAR: f64 = 0.05;
-/// Relative difference of rates that count as the same.
+/// Relative difference of rates that count as equal.
 const SAME_RATE: f64 = 1e-6;
 
 /// A channel.
@@ -27,16 +27,16 @@ pub(crate) struct AlignedChannel {
     pub(crate) name: String,
     /// Its samples, in the unit of the file.
     pub(crate) samples: Vec<f64>,
-    /// That unit, if it is known.
+    /// That unit, if known.
     pub(crate) unit: Option<NamedUnit>,
-    /// That unit as the file writes it, known or not.
+    /// That unit as written in the file, known or not.
     pub(crate) unit_text: Option<String>,
     /// Whether it is marked as a result of `compensate`.
     is_compensated: bool,
 }
 
 impl AlignedChannel {
-    /// Refuses a result of `compensate` where the answer of a stand is wanted.
+    /// Rejects a result of `compensate` where the response of a stand is required.
     ///
     /// # Errors
     /// If it is marked as one.
@@ -47,7 +47,7 @@ impl AlignedChannel {
         }
     }
 
-    /// The channel as a stand takes it.
+    /// The channel in the form required by a stand.
     pub(crate) fn channel(&self) -> RecordedChannel<'_> {
         RecordedChannel {
             name: &self.name,
@@ -57,31 +57,31 @@ impl AlignedChannel {
     }
 }
 
-/// Channels with a sample each at every moment.
+/// Channels sampled at the same moments.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct AlignedChannels {
-    /// Name of the file, for people.
+    /// Name of the file, for messages.
     pub(crate) source: String,
-    /// Samples a second.
+    /// Sampling rate in Hz.
     pub(crate) rate_hz: f64,
-    /// Standard uncertainty of that, if it comes from stamps.
+    /// Its standard uncertainty, if it comes from stamps.
     pub(crate) rate_std_hz: Option<f64>,
     /// Time of the first sample.
     pub(crate) start: Moment,
-    /// The channels, in the order in which they were asked for.
+    /// The channels, in the order requested.
     pub(crate) channels: Vec<AlignedChannel>,
-    /// What should be known of the file and of how its channels were brought together; what was lost comes first.
+    /// Warnings about the file and the alignment of its channels; losses come first.
     pub(crate) warnings: Vec<Warning>,
-    /// Whether something of the file was lost.
+    /// Whether something in the file was lost.
     pub(crate) is_lossy: bool,
 }
 
 impl AlignedChannels {
-    /// Reads the channels that are chosen, out of a file of any format.
+    /// Reads the selected channels of a file of any format.
     ///
     /// # Errors
-    /// If one is not there, has no rate or holds no number somewhere, or if they do not lie on one time
-    /// axis and cannot be brought there.
+    /// If one is missing, has no rate or contains a non-numeric sample, or if they have different time
+    /// axes and cannot be aligned.
     pub(crate) fn read(
         input: &Input,
         choices: &[ChannelChoice],
@@ -92,8 +92,8 @@ impl AlignedChannels {
         Self::of(recording, choices, reading).map_err(|failure| failure.at(&source))
     }
 
-    /// The channels that are chosen. Messages are interpolated where their stamps are not uniform or not the same;
-    /// so are the samples of a text with `--resample`.
+    /// The selected channels. Messages are interpolated where their stamps are not uniform or differ; so are the
+    /// samples of a text with `--resample`.
     ///
     /// # Errors
     /// See [`AlignedChannels::read`].
@@ -110,7 +110,7 @@ impl AlignedChannels {
         let mut warnings = recording.all_warnings();
         let mut chosen = Vec::new();
         for (i, choice) in choices.iter().enumerate() {
-            // Of messages, only what is chosen was read.
+            // Only the selected messages were read.
             let place = if is_text { recording.place(choice)? } else { i };
             let selection = recording.select_at(place, choice, reading)?;
             check_cells(selection.channel, reading)?;
@@ -155,7 +155,8 @@ impl AlignedChannels {
         Ok(aligned)
     }
 
-    /// Interpolates all channels on a grid with the step of the first one, over the time that all have.
+    /// Interpolates all channels on a grid with the step of the first one, over their common time
+    /// range.
     fn resample(&mut self, chosen: &[Selection]) -> Result<(), Failure> {
         let stamps: Vec<Arc<Vec<f64>>> = chosen
             .iter()
@@ -212,7 +213,7 @@ impl AlignedChannels {
     }
 }
 
-/// Says that channels of these names were interpolated: in which words, to which rate and from when on, and what was met with.
+/// Reports that channels were interpolated, with the reason, the rate, the start and any problems.
 pub(crate) fn resampled(
     names: &str,
     [were, stamps_are]: [&str; 2],
@@ -241,7 +242,7 @@ pub(crate) fn resampled(
     Warning::new("resampled", message)
 }
 
-/// Keeps the worst of what resampling met with.
+/// Keeps the worst problems of resampling.
 fn note_worst(worst: &mut Resampled, done: &Resampled) {
     worst.gaps = worst.gaps.max(done.gaps);
     worst.repeated = worst.repeated.max(done.repeated);
@@ -259,8 +260,8 @@ fn aligned_channel(selection: &Selection, samples: Vec<f64>) -> AlignedChannel {
     }
 }
 
-/// The channels with their first samples, which are taken out of the recording: they may be most of what
-/// it holds.
+/// The channels with their first samples, which are moved out of the recording, as they may be most of
+/// it.
 fn filled(
     recording: &mut Recording,
     empty: Vec<(usize, AlignedChannel)>,
@@ -279,7 +280,7 @@ fn filled(
     empty.into_iter().enumerate().map(fill).collect()
 }
 
-/// Refuses samples that are no numbers.
+/// Rejects non-finite samples.
 fn check_finite(selection: &Selection) -> Result<(), Failure> {
     let channel = selection.channel;
     match channel.samples.iter().position(|v| !v.is_finite()) {
@@ -295,11 +296,11 @@ fn check_finite(selection: &Selection) -> Result<(), Failure> {
     }
 }
 
-/// Whether all channels have their samples at the same moments, a uniform step apart. Stamps of a text that are
-/// the same for all channels must be uniform, and so must those of a single channel of messages.
+/// Whether all channels are sampled at the same, uniformly spaced moments. Common stamps of a text must be
+/// uniform, and so must those of a single message channel.
 ///
 /// # Errors
-/// If their rates are too different to be brought together, or nothing says how they lie.
+/// If their rates differ too much to be aligned, or their time axis is unknown.
 fn is_one_axis(chosen: &[Selection], is_text: bool) -> Result<bool, Failure> {
     let first = &chosen[0];
     let stamps = |c: &Selection| c.channel.axis.stamps_after(first.channel.axis.origin_ns);
@@ -328,7 +329,7 @@ fn is_one_axis(chosen: &[Selection], is_text: bool) -> Result<bool, Failure> {
     }
 }
 
-/// Whether stamps are as good as the same, as far as both go.
+/// Whether stamps are practically equal over their common length.
 fn is_same(a: &[f64], b: &[f64], rate_hz: f64) -> bool {
     a.iter()
         .zip(b)

@@ -48,7 +48,7 @@ fn both(recording: &Recording) -> Result<AlignedChannels, Failure> {
     )
 }
 
-/// Stamps a millisecond apart, each off by up to so much of that.
+/// Stamps a millisecond apart, with jitter up to a fraction of that.
 fn stamps(first_s: f64, jitter: f64) -> TimeAxis {
     let off = |i: u32| jitter * (f64::from(i) * 2.4).sin();
     let all = (0..400)
@@ -90,7 +90,7 @@ fn messages_at_other_moments_are_interpolated_and_that_is_said() {
     assert_eq!(found.warnings[0].code, "resampled");
     let [a, b] = [&found.channels[0].samples, &found.channels[1].samples];
     assert!(a.len() == b.len() && a.len() > 380);
-    // Both channels hold the same wave, so that they must agree where they overlap.
+    // Both channels contain the same wave, so they must agree where they overlap.
     for (i, (a, b)) in a.iter().zip(b).enumerate() {
         let truth = wave(found.start.seconds() + i as f64 / found.rate_hz);
         assert!(
@@ -165,7 +165,7 @@ fn rounded_stamps_of_a_text_are_not_interpolated() {
     assert_eq!(found.channels[0].samples, record.channels[0].samples);
     let codes: Vec<&str> = found.warnings.iter().map(|w| w.code).collect();
     assert_eq!(codes, ["rounded-time-stamps"]);
-    // A gap is another thing.
+    // A gap is treated differently.
     let mut gap: Vec<f64> = (0..400).map(|i| f64::from(i) * 1e-3).collect();
     gap[200..].iter_mut().for_each(|t| *t += 0.02);
     let gap = TimeAxis::of_stamps("t", Arc::new(gap));

@@ -1,4 +1,4 @@
-//! How the samples of a channel lie in time.
+//! Time axis of a channel.
 
 use std::sync::Arc;
 
@@ -10,26 +10,27 @@ use super::moment::Moment;
 use super::stamps::StampGrid;
 use crate::io::digits;
 
-/// Largest deviation of a step from the usual one, as a fraction of it, in a record that has a rate.
+/// Largest relative deviation of a step from the typical one in a record with a rate.
 const USUAL: f64 = 0.25;
-/// Relative difference of the usual step from the mean one that leaves nothing to be asked.
+/// Largest relative difference of the typical step from the mean one without ambiguity.
 const SAME: f64 = 1e-3;
-/// A step longer than this many usual ones leaves out a sample.
+/// Ratio to the typical step above which a step leaves out a sample.
 const GAP: f64 = 1.5;
-/// Median deviations from the usual step beyond which a step is unlike the others: six standard deviations of a normal law.
+/// Median deviations from the typical step beyond which a step differs from the others: six standard deviations of a
+/// normal distribution.
 const BEYOND_SCATTER: f64 = 9.0;
-/// Fewest steps unlike the others that speak for rounding: one or two are gaps.
+/// Minimum number of different steps that indicate rounding; one or two are gaps.
 const FEWEST_UNLIKE: usize = 3;
-/// Largest deviation of a step, as a fraction of it, that counts as uniform.
+/// Largest relative deviation of a step that counts as uniform.
 pub(super) const UNIFORM: f64 = 0.01;
-/// Deviations among which steps are averaged where there are gaps.
+/// Relative deviation up to which steps are averaged if there are gaps.
 const CLOSE: [f64; 2] = [0.01, 0.05];
 
-/// What rows are that come from the last to the first, and what to do.
+/// Advice for rows in reverse order.
 pub const REVERSED: &str =
     "the time stamps fall from row to row; sort the rows by time, the earliest first";
 
-/// What is assumed of stamps in a column or vector, of whose unit the file says nothing, or nothing of use.
+/// Note on stamps in a column or vector whose unit is unknown or unusable in the file.
 pub fn seconds_assumed(name: &str, unit: Option<&str>) -> String {
     let says = match unit {
         Some(unit) => format!("gives the unit \"{unit}\", which is none of time"),
@@ -38,7 +39,7 @@ pub fn seconds_assumed(name: &str, unit: Option<&str>) -> String {
     format!("\"{name}\" {says}: seconds were assumed")
 }
 
-/// Whether stamps fall all the way.
+/// Whether stamps decrease throughout.
 pub fn falls(stamps: &[f64]) -> bool {
     stamps.len() > 2 && stamps.windows(2).all(|pair| pair[1] < pair[0])
 }
@@ -46,53 +47,54 @@ pub fn falls(stamps: &[f64]) -> bool {
 /// The time axis of a channel.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TimeAxis {
-    /// Samples a second; `None` if the file says nothing of it, or if its stamps have no usual step.
+    /// Sampling rate in Hz; `None` if the file does not give it, or if its stamps have no typical
+    /// step.
     pub rate_hz: Option<f64>,
-    /// Standard uncertainty of a rate that comes from stamps, by their rounding and jitter; that of the clock is not in it.
+    /// Standard uncertainty of a rate from stamps, due to rounding and jitter, without that of the clock.
     pub rate_std_hz: Option<f64>,
-    /// Where the rate comes from.
+    /// Source of the rate.
     pub rate_from: RateFrom,
     /// Time of the first sample on the file's own axis.
     pub start: Option<Moment>,
     /// Date and time of the first sample, as written.
     pub start_text: Option<String>,
-    /// Time of each sample in seconds after the origin, as read.
+    /// Time of each sample in seconds relative to the origin, as read.
     pub stamps_s: Option<Arc<Vec<f64>>>,
-    /// Cells among the stamps that hold no number; the stamps are `NaN` there.
+    /// Non-numeric cells among the stamps; the stamps are `NaN` there.
     pub holes: Vec<Hole>,
-    /// Nanoseconds at which the stamps are zero: those since 1970 would cost an `f64` its last digits.
+    /// Origin of the stamps in ns: times since 1970 would lose digits in an `f64`.
     pub origin_ns: i64,
-    /// Heading of the column of stamps, or what they are.
+    /// Heading of the column of stamps, or a description.
     pub stamps_in: Option<String>,
-    /// Of samples that pass as a stream, the grid that their stamps lie on.
+    /// For a stream, the grid of its stamps.
     pub(crate) grid: Option<StampGrid>,
-    /// Of samples that pass as a stream at a given rate, the grid of the stamps that they have besides.
+    /// For a stream at a given rate, the grid of its additional stamps.
     pub(crate) beside: Option<StampGrid>,
-    /// Nanoseconds since 1970, or since midnight, at which the stamps are zero, where the file gives dates or times of day.
+    /// Origin of the stamps in ns since 1970, or since midnight, if the file gives dates or times of day.
     pub(crate) clock_ns: Option<i64>,
-    /// Rate that the head of the file gives, in Hz, used or not.
+    /// Rate in the file header, in Hz, used or not.
     pub header_rate_hz: Option<f64>,
-    /// What was taken for granted about the axis and should be confirmed before results rest on it:
+    /// Assumption about the axis that should be confirmed before results rely on it:
     /// `the column "Time" gives no unit; seconds were assumed`.
     pub assumed: Option<String>,
 }
 
-/// Where a rate comes from.
+/// Source of a rate.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum RateFrom {
-    /// There is none.
+    /// No rate.
     #[default]
     None,
     /// From the user.
     Given,
-    /// From the head of the file; the words that gave it.
+    /// From the file header; the words that gave it.
     Header(String),
-    /// From the stamps in a column; its heading.
+    /// From a column of stamps; its heading.
     Stamps(String),
 }
 
 impl RateFrom {
-    /// For people and for JSON: `none`, `given`, `header: Delta_X`, `stamps: Time [s]`.
+    /// As text and for JSON: `none`, `given`, `header: Delta_X`, `stamps: Time [s]`.
     #[must_use]
     pub fn describe(&self) -> String {
         match self {
@@ -118,10 +120,10 @@ impl RateFrom {
     }
 }
 
-/// Usual step of time stamps, in their unit. Where nearly all steps are within 25 % of their median it
-/// is the mean of these, which takes out the rounding of the stamps; among gaps it is the mean of
-/// those within 1 % (or 5, or 25 %) of the median, whichever is half of all.
-/// `None` if fewer than half of the steps are within 25 %, or fewer than two stamps rise.
+/// Typical step of time stamps, in their unit. If nearly all steps are within 25 % of their median, it
+/// is the mean of these, which averages out the rounding of the stamps; with gaps it is the mean of
+/// those within 1 % (or 5, or 25 %) of the median, whichever first includes half of all. `None` if
+/// fewer than half of the steps are within 25 %, or fewer than two stamps rise.
 ///
 /// ```
 /// use torqcomp::recording::typical_step;
@@ -167,26 +169,26 @@ pub fn typical_step(stamps: &[f64]) -> Option<f64> {
     Some(sum / count as f64)
 }
 
-/// The mean step, where all rise by about as much as the first one: then all are within the usual part of their median.
+/// The mean step, if all are about equal to the first one, and so within the typical range of their median.
 fn equal_step(stamps: &[f64]) -> Option<f64> {
     let [first, second, ..] = stamps else {
         return None;
     };
     let any = second - first;
     let near = 0.25 * USUAL * any;
-    // Every step is looked at whatever the others were, which several at a time can be.
+    // All steps are evaluated unconditionally, which allows vectorisation.
     let alike = stamps.windows(2).fold(any > 0.0, |alike, pair| {
         alike & ((pair[1] - pair[0] - any).abs() <= near)
     });
     alike.then(|| (stamps[stamps.len() - 1] - first) / (stamps.len() - 1) as f64)
 }
 
-/// A step from stamp to stamp.
+/// Step between stamps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SampleStep {
     /// In the unit of the stamps.
     pub(super) step: f64,
-    /// Its relative standard uncertainty, if the stamps say.
+    /// Its relative standard uncertainty, if the stamps determine it.
     pub(super) relative_std: Option<f64>,
 }
 
@@ -199,8 +201,8 @@ impl SampleStep {
         }
     }
 
-    /// Of a line through rounded stamps over a span: any step between two bounds, or one quantum more or less over the
-    /// span, is as likely, which is half their distance over √3.
+    /// From a line through rounded stamps over a span: uniform between two bounds, or within one quantum over the
+    /// span, with a standard uncertainty of half the width over √3.
     pub(super) fn of_line(line: &Rounded, span: f64) -> Self {
         let [low, high] = line.steps_over(span);
         Self::new(
@@ -209,7 +211,8 @@ impl SampleStep {
         )
     }
 
-    /// Of usual steps: their mean, and of stamps without a gap all of the time that they cover.
+    /// From typical steps: their mean, and for stamps without a gap all of the time that they
+    /// cover.
     fn of_mean(usual: f64, stamps: &[f64]) -> Self {
         let steps: Vec<f64> = stamps.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let mut off: Vec<f64> = steps
@@ -239,17 +242,17 @@ impl SampleStep {
         Self::new(step, std_over(&off, count) / (count * step))
     }
 
-    /// Standard uncertainty of a rate that is this step's.
+    /// Standard uncertainty of the corresponding rate.
     pub(super) fn rate_std_hz(&self, rate_hz: f64) -> Option<f64> {
         self.relative_std.map(|relative| relative * rate_hz)
     }
 }
 
-/// Part of the record over which the scatter of stamps is followed.
+/// Divisor of the record length that gives the range over which the scatter of stamps is followed.
 const FOLLOWED: usize = 8;
 
-/// Standard deviation of the difference of two stamps that are so many steps apart, from their distances from a uniform grid:
-/// `a + b m` over `m` steps, where each stamp has an error of its own (`a`), each step one (`b`), or both.
+/// Standard deviation of the difference of two stamps `steps` apart, from their deviations from a uniform grid:
+/// `a + b m` over `m` steps, where each stamp has an independent error (`a`), each step one (`b`), or both.
 fn std_over(off: &[f64], steps: f64) -> f64 {
     let square = |lag: usize| {
         let pairs = off.iter().zip(&off[lag..]);
@@ -265,8 +268,8 @@ fn std_over(off: &[f64], steps: f64) -> f64 {
     (once + growth * (steps - 1.0).max(0.0)).sqrt()
 }
 
-/// The step of the straight line that stamps are but for their rounding (3 and 4 ms by turns are a step of 3.5 ms), or
-/// of their longest part without a gap; else the usual step.
+/// Step of the straight line that stamps follow except for rounding (3 and 4 ms alternating are a step of 3.5 ms), or
+/// of their longest part without a gap; otherwise the typical step.
 pub(super) fn step_of(stamps_s: &[f64], origin_s: f64) -> Option<SampleStep> {
     let line = |part: &[f64]| {
         let span = part.last()? - part.first()?;
@@ -292,24 +295,24 @@ pub(super) fn step_of(stamps_s: &[f64], origin_s: f64) -> Option<SampleStep> {
     Some(line(longest).filter(|_| is_most).unwrap_or(usual))
 }
 
-/// How stamps about a step apart are rounded, if that is all that is wrong with them.
+/// Rounding of stamps about a step apart, if that is their only fault.
 pub(super) fn rounding(stamps_s: &[f64], step: f64, origin_s: f64) -> Option<Rounded> {
     line_of(stamps_s, origin_s).filter(|_| has_unlike_steps(stamps_s, step))
 }
 
-/// Whether some steps, more than gaps would be, differ from the usual one.
+/// Whether more steps than gaps would explain differ from the typical one.
 fn has_unlike_steps(stamps_s: &[f64], step: f64) -> bool {
     let unlike = |pair: &&[f64]| ((pair[1] - pair[0]) / step - 1.0).abs() > UNIFORM;
     let some = stamps_s.windows(2).filter(unlike).take(FEWEST_UNLIKE);
     some.count() == FEWEST_UNLIKE
 }
 
-/// The line of stamps that deviate from it by their rounding only. `origin_s` is the time at which they are zero: a
-/// clock that counts from there in an `f64` has its last bit.
+/// Line of stamps that deviate from it by their rounding only. `origin_s` is their origin: a clock with that origin
+/// in an `f64` is limited by the last bit.
 fn line_of(stamps_s: &[f64], origin_s: f64) -> Option<Rounded> {
     let resolution_s = 2.0 * f64::EPSILON * (origin_s.abs() + stamps_s.last()?.abs());
     let line = uniform_line(stamps_s.iter().copied().enumerate(), resolution_s)?;
-    // A single gap hides in a rounding to more than half a step.
+    // A rounding of more than half a step could hide a single gap.
     let may_hide_gap =
         line.quantum_s > 0.5 * line.step_s && line.farthest_s > 0.05 * line.quantum_s;
     let is_rounding =
@@ -324,7 +327,7 @@ impl TimeAxis {
         Self::of_stamps_after(0, heading, stamps_s)
     }
 
-    /// An axis of stamps in seconds after an origin in ns.
+    /// An axis of stamps in seconds relative to an origin in ns.
     #[must_use]
     pub fn of_stamps_after(origin_ns: i64, heading: &str, stamps_s: Arc<Vec<f64>>) -> Self {
         let origin_s = origin_ns as f64 * 1e-9;
@@ -350,7 +353,7 @@ impl TimeAxis {
         }
     }
 
-    /// Its stamps in seconds after another origin.
+    /// Its stamps in seconds relative to another origin.
     pub(crate) fn stamps_after(&self, origin_ns: i64) -> Option<Arc<Vec<f64>>> {
         let stamps = self.stamps_s.as_ref()?;
         let later_s = self.origin_ns.wrapping_sub(origin_ns) as f64 * 1e-9;
@@ -360,7 +363,7 @@ impl TimeAxis {
         })
     }
 
-    /// Where its rate comes from, with the uncertainty that is known of it.
+    /// Source of its rate, with the uncertainty if known.
     pub(crate) fn rate_sentence(&self) -> String {
         let from = self.rate_from.sentence(self.is_resampled());
         match self.rate_std_hz {
@@ -369,7 +372,7 @@ impl TimeAxis {
         }
     }
 
-    /// A time on it, in seconds after its origin.
+    /// A time on it, in seconds relative to its origin.
     pub(crate) fn moment(&self, after_s: f64) -> Moment {
         Moment {
             origin_ns: self.origin_ns,
@@ -377,7 +380,7 @@ impl TimeAxis {
         }
     }
 
-    /// The axis of samples that were brought to uniform steps.
+    /// Axis of samples resampled to uniform steps.
     #[must_use]
     pub fn uniform(rate_hz: f64, start: Moment) -> Self {
         Self {
@@ -386,7 +389,7 @@ impl TimeAxis {
         }
     }
 
-    /// An axis of a rate out of the head of a file; `words` gave it.
+    /// Axis with a rate from the file header; `words` gave it.
     #[must_use]
     pub fn of_header(words: &str, rate_hz: f64, start_s: Option<f64>) -> Self {
         Self {
@@ -399,7 +402,7 @@ impl TimeAxis {
     }
 }
 
-/// A rate without the rounding of the stamps it was found from: nine digits, if they say the same.
+/// A rate without the rounding errors of its stamps: nine digits, if equivalent.
 pub(crate) fn without_rounding(rate_hz: f64) -> f64 {
     let short: f64 = digits::text(rate_hz, 9).parse().unwrap_or(rate_hz);
     if (short / rate_hz - 1.0).abs() < 1e-10 {
@@ -421,7 +424,7 @@ mod tests {
         assert_eq!(without_rounding(1000.0 / 3.0), 1000.0 / 3.0);
     }
 
-    /// Stamps with an error each, as those of a network, and steps with an error each, as those of a loop that waits.
+    /// Stamps with independent errors, as over a network, and steps with independent errors, as in a waiting loop.
     #[test]
     fn the_rate_of_jittered_stamps_is_as_uncertain_as_it_is_stated() {
         let mut state = 12_345_u64;

@@ -1,45 +1,45 @@
-//! Blocks of samples, as the pipeline moves them.
+//! Blocks of samples, the unit of the pipeline.
 
 use super::stamps::{IrregularStep, StampGrid};
 use super::text::{ChannelPlan, ChannelRows, Chunks, LastLine, Piece, RowPlan, last_line};
 use crate::failure::{Failure, RowKind};
 use crate::warning::Warning;
 
-/// What gives the blocks of a channel, in order.
+/// A source of the blocks of a channel, in order.
 pub(crate) trait BlockSource: Send {
-    /// Makes blocks at least so many samples long, where they are of text.
+    /// Sets the minimum number of samples per block, for text.
     fn set_fewest(&mut self, _samples: usize) {}
 
     /// Fills a block with the next samples, or the text of the next rows; `false` at the end.
     ///
     /// # Errors
-    /// If the source cannot be read any further.
+    /// If the source cannot be read further.
     fn next(&mut self, block: &mut Block) -> Result<bool, Failure>;
 
-    /// What was lost, and what else should be known, once all was read.
+    /// Losses, and further warnings, after everything was read.
     fn finish(&mut self) -> (Option<Warning>, Vec<Warning>) {
         (None, Vec::new())
     }
 
-    /// What a sample is called in a message, as in `message 12`.
+    /// What a sample is called in messages, as in `message 12`.
     fn row_kind(&self) -> RowKind;
 }
 
-/// Some samples of a channel and their stamps, out of a text with the text itself.
+/// Samples of a channel and their stamps; for a text, with the text itself.
 #[derive(Debug, Default)]
 pub(crate) struct Block {
-    /// The bytes of a text.
+    /// Bytes of the text.
     pub(crate) text: Vec<u8>,
-    /// What they say.
+    /// Samples read from the text.
     pub(crate) rows: ChannelRows,
-    /// What a last line without a line end is, and its text.
+    /// A last line without a line end: its kind and text.
     pub(super) last_line: Option<(LastLine, String)>,
     /// First irregular time stamp within the block.
     pub(super) irregular: Option<IrregularStep>,
 }
 
 impl Block {
-    /// Reads the rows of a text and checks the stamps. Needs no other block.
+    /// Parses the rows of a text and checks the stamps, independently of other blocks.
     pub(crate) fn read_rows(&mut self, plan: Option<&ChannelPlan>, grid: Option<&StampGrid>) {
         if let Some(plan) = plan {
             self.rows.read(&self.text, plan);
@@ -49,7 +49,7 @@ impl Block {
 }
 
 impl Block {
-    /// Moves the content of the next block behind that of this one; rows of a text are then read again.
+    /// Appends the content of the next block; rows of a text are then parsed again.
     pub(super) fn append(&mut self, next: &mut Self) {
         self.text.append(&mut next.text);
         self.rows.values.append(&mut next.rows.values);
@@ -62,20 +62,20 @@ impl Block {
     }
 }
 
-/// The rows of a text.
+/// Rows of a text.
 pub(super) struct TextBlocks {
     pub(super) source: String,
     pub(super) chunks: Chunks,
     /// Mean length of a row, in bytes.
     pub(super) row_bytes: usize,
-    /// How all columns of the table are read.
+    /// Parsing of all columns of the table.
     pub(super) table: RowPlan,
-    /// Whether no line stands before the next piece.
+    /// Whether the next piece is the first.
     pub(super) is_first: bool,
 }
 
 impl TextBlocks {
-    /// Judges a last line that has no line end, and takes it away if the file was cut within it.
+    /// Judges a last line without a line end, and removes it if the file was truncated within it.
     fn look_at_last_line(&self, block: &mut Block) {
         let judged = LastLine::of(&block.text, self.is_first, &self.table);
         let last = last_line(&block.text);

@@ -1,5 +1,5 @@
-//! Stamps farther on in a file, read before it is: with them the rate is known of the whole record, not of its first
-//! rows alone, so that it does not depend on whether a verb streams.
+//! Stamps farther on in a file, read in advance: they give the rate of the whole record rather than of its first
+//! rows, so that it does not depend on whether a command streams.
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -13,14 +13,14 @@ use crate::io::Input;
 use crate::io::storage::Stored;
 use crate::recording::text::{ChannelPlan, ChannelRows};
 
-/// Bytes that are read at the first checkpoint behind the head, and at each.
+/// Number of bytes read at each checkpoint; the first one is this far after the head.
 const PIECE: u64 = 1 << 12;
 /// Largest distance of a stamp from the grid, in steps, at which steps can still be counted.
 const COUNTABLE: f64 = 0.25;
 
-/// The step of stamps that begin with `first` and are about `step` apart, from stamps farther and farther on: each is a
-/// whole number of steps away, which the step as known so far is sharp enough to tell. All together are then the stamps
-/// of one line, if they deviate from it by their rounding only. `None` where steps cannot be counted.
+/// Step of stamps that begin with `first` and are about `step` apart, refined with stamps farther and farther on: each
+/// is a whole number of steps away, which the present estimate is accurate enough to determine. All together are then
+/// the stamps of one line, if they deviate from it by their rounding only. `None` if steps cannot be counted.
 ///
 /// A step of 1.01 that is found with 101 stamps is 1.0099 when the stamp after 10 100 steps is known to be 10 200:
 /// 10 200 / 1.01 = 10 099.01.
@@ -36,7 +36,7 @@ pub(super) fn sharpened(
     }
     let resolution = |last: f64| 2.0 * f64::EPSILON * (origin.abs() + last.abs());
     let rows = first.iter().copied().enumerate();
-    // Several rows share a stamp that is rounded coarsely: it does not tell their places.
+    // If several rows share a coarsely rounded stamp, it does not determine their indices.
     let is_line = uniform_line(rows.clone(), resolution(first[first.len() - 1])).is_some();
     let place = |stamp: f64| ((stamp - start) / step).round().max(0.0) as usize;
     let known = rows.map(|(row, stamp)| (if is_line { row } else { place(stamp) }, stamp));
@@ -55,11 +55,11 @@ pub(super) fn sharpened(
     let last = known.last()?.1;
     let ends = known[..first.len()].iter().chain(known.last());
     let line = uniform_line(known.iter().copied(), resolution(last))
-        // Where only the end is known, those between are not rounded as the others are.
+        // If only the end is known, the intermediate ones are rounded differently.
         .or_else(|| uniform_line(ends.copied(), resolution(last)));
     Some(match line {
         Some(line) => SampleStep::of_line(&line, last - start),
-        // The jitter of both ends counts less over a longer time.
+        // The jitter of both ends matters less over a longer time.
         None => SampleStep {
             step,
             relative_std: found
@@ -69,8 +69,8 @@ pub(super) fn sharpened(
     })
 }
 
-/// Stamps of a text at distances that double, and its last one. `from` is the byte behind the head, if they are wanted.
-/// Empty where the place cannot be sought, and where a row cannot be read as it stands.
+/// Stamps of a text at distances that double, and the last one. `from` is the byte after the head, if they are needed.
+/// Empty if the file cannot be seeked, or a row cannot be parsed on its own.
 ///
 /// # Errors
 /// If the file cannot be read.
@@ -88,7 +88,7 @@ pub(super) fn of_text(
 }
 
 fn of_file(path: &Path, from: u64, plan: &ChannelPlan) -> io::Result<Vec<f64>> {
-    // To open a pipe a second time would wait for a second writer.
+    // Opening a pipe a second time would wait for a second writer.
     let meta = std::fs::metadata(path)?;
     if !meta.is_file() {
         return Ok(Vec::new());
@@ -110,7 +110,7 @@ fn of_file(path: &Path, from: u64, plan: &ChannelPlan) -> io::Result<Vec<f64>> {
     Ok(stamps)
 }
 
-/// The stamp of the first whole line behind a byte, or of the last one.
+/// Stamp of the first whole line after a byte, or of the last one.
 fn stamp_behind(
     file: &mut Stored<File>,
     at: u64,
@@ -120,7 +120,7 @@ fn stamp_behind(
     file.seek(SeekFrom::Start(at))?;
     let mut bytes = Vec::new();
     file.take(PIECE).read_to_end(&mut bytes)?;
-    // What stands before the first line end, and behind the last, may be cut.
+    // The text before the first line end, and after the last, may be incomplete.
     let ends = (
         memchr::memchr(b'\n', &bytes),
         memchr::memrchr(b'\n', &bytes),

@@ -1,4 +1,4 @@
-//! Choosing one channel of a recording: the same way for every format and verb.
+//! Selection of one channel of a recording, the same for every format and command.
 
 use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
 use torqcomp_model::Unit;
@@ -13,7 +13,7 @@ use crate::print::{list, plural};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
-/// What a channel goes by.
+/// Identification of a channel.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Label<'a> {
     pub(crate) heading: &'a str,
@@ -22,12 +22,12 @@ pub(crate) struct Label<'a> {
     pub(crate) segment: Option<usize>,
 }
 
-/// Channels from which on a table with fewer rows than a tenth of that is taken for a transposed one.
+/// Minimum number of channels of a possibly transposed table, with fewer rows than a tenth of that.
 const WIDE: usize = 300;
-/// Channels that a message names at most.
+/// Maximum number of channels listed in a message.
 const NAMED: usize = 20;
 
-/// The question whether a table of so many channels is transposed, if it looks like that.
+/// Question whether a table is transposed, if it looks like that.
 pub(in crate::recording) fn transposed(columns: usize, rows: Option<usize>) -> Option<Failure> {
     let is_short = rows.is_none_or(|rows| 10 * rows < columns);
     (columns >= WIDE && is_short).then(|| {
@@ -43,9 +43,9 @@ pub(in crate::recording) fn transposed(columns: usize, rows: Option<usize>) -> O
     })
 }
 
-/// The place of the channel that is wanted: by its heading, its name without the unit, either of them in any case, its
-/// number from 1, or a part of the heading in any case that no other has; the only channel if none is named. `flag` is
-/// the flag that names it.
+/// Index of the requested channel: by its heading, its name without the unit, either of them ignoring case, its number
+/// from 1, or an unambiguous part of the heading ignoring case; the only channel if none is named. `flag` is the
+/// option that names it.
 pub(crate) fn choose(
     channels: &[Label],
     wanted: Option<&str>,
@@ -92,7 +92,7 @@ pub(crate) fn choose(
     ))
 }
 
-/// The place of the channel with such a heading or name, in any case.
+/// Index of the channel with this heading or name, ignoring case.
 pub(super) fn by_name(
     channels: &[Label],
     wanted: &str,
@@ -122,7 +122,7 @@ pub(super) fn by_name(
     Ok(None)
 }
 
-/// The place of the only channel whose heading has a part, in any case.
+/// Index of the only channel whose heading contains a part, ignoring case.
 pub(super) fn by_part(channels: &[Label], wanted: &str) -> Result<Option<usize>, Failure> {
     let part = wanted.to_lowercase();
     let has_part = |place: &usize| channels[*place].heading.to_lowercase().contains(&part);
@@ -144,7 +144,7 @@ pub(super) fn by_part(channels: &[Label], wanted: &str) -> Result<Option<usize>,
     }
 }
 
-/// The first of many names, and how many more there are.
+/// The first of many names, and the number of further ones.
 fn named(names: impl ExactSizeIterator<Item = String>) -> String {
     let more = names.len().saturating_sub(NAMED);
     match more {
@@ -156,7 +156,7 @@ fn named(names: impl ExactSizeIterator<Item = String>) -> String {
     }
 }
 
-/// The channels as they can be chosen: by name, or by number where a name is used twice.
+/// The channels as they can be selected: by name, or by number if a name is used twice.
 fn names(channels: &[Label]) -> String {
     let one = |(place, channel): (usize, &Label)| {
         let same = channels.iter().filter(|c| c.name == channel.name);
@@ -176,7 +176,7 @@ fn names(channels: &[Label]) -> String {
     named(channels.iter().enumerate().map(one))
 }
 
-/// The unit of a channel: the one that is given, or that of the file. A warning if both differ.
+/// Unit of a channel: the given one, or that of the file; with a warning if both differ.
 pub(crate) fn unit_of(
     choice: &ChannelChoice,
     heading: &str,
@@ -186,7 +186,7 @@ pub(crate) fn unit_of(
         return Ok((of_file.cloned(), None));
     };
     let given = NamedUnit::given(flag, text)?;
-    // The answer to whether a pound is a force is none that overrides it.
+    // Answering whether a pound is a force does not override the unit.
     let answers = |named: &NamedUnit| {
         let readings = Unit::readings_of_weight(&named.text).into_iter().flatten();
         let mut units = readings.filter_map(|text| Unit::parse(&text).ok());
@@ -208,7 +208,7 @@ pub(crate) fn unit_of(
     Ok((Some(given), warning))
 }
 
-/// A warning if a rate that was given is not that of the stamps.
+/// A warning if a given rate contradicts the stamps.
 pub(crate) fn overridden(reading: &Reading, stamps_in: &str, stamps_s: &[f64]) -> Option<Warning> {
     let rate_hz = reading.rate_hz.filter(|_| !reading.resample)?;
     let stamped_hz = 1.0 / step_of(stamps_s, 0.0)?.step;
@@ -226,7 +226,7 @@ pub(crate) fn overridden(reading: &Reading, stamps_in: &str, stamps_s: &[f64]) -
     ))
 }
 
-/// What is said where the head of a file and its stamps give two rates; `whose` names the channels.
+/// Warning about contradictory rates in the file header and its stamps; `whose` names the channels.
 pub(crate) fn contradicted(whose: &str, found: &Contradiction) -> Warning {
     Warning::new(
         "rate-contradicts-stamps",
@@ -239,24 +239,24 @@ pub(crate) fn contradicted(whose: &str, found: &Contradiction) -> Warning {
     )
 }
 
-/// A channel that was chosen, with what the user said of it taken in.
+/// A selected channel, including the user's settings for it.
 #[derive(Debug, Clone)]
 pub(crate) struct Selection<'a> {
     pub(crate) channel: &'a Channel,
-    /// Samples a second.
+    /// Sampling rate in Hz.
     pub(crate) rate_hz: f64,
-    /// Standard uncertainty of that, if it comes from stamps.
+    /// Its standard uncertainty, if it comes from stamps.
     pub(crate) rate_std_hz: Option<f64>,
-    /// Time of the first sample: 0 if the file does not say, or the rate was given and the record is whole.
+    /// Time of the first sample: 0 if unknown, or if the rate was given and the record is complete.
     pub(crate) start: Moment,
-    /// Unit of the samples, if it is known.
+    /// Unit of the samples, if known.
     pub(crate) unit: Option<NamedUnit>,
-    /// Where the command line and the file differ.
+    /// Contradictions between command line and file.
     pub(crate) warnings: Vec<Warning>,
 }
 
 impl Recording {
-    /// The channel that is chosen, or the only one, with its rate.
+    /// The selected channel, or the only one, with its rate.
     ///
     /// # Errors
     /// If no channel or several have the name, or its rate is unknown or only assumed.
@@ -272,7 +272,7 @@ impl Recording {
         Ok(selection)
     }
 
-    /// The same, where the place of the channel is known.
+    /// The same for a known index of the channel.
     pub(super) fn select_at(
         &self,
         place: usize,
@@ -285,7 +285,7 @@ impl Recording {
         let mut warnings: Vec<Warning> = warning.into_iter().collect();
         let axis = &channel.axis;
         let (rate_hz, start) = match (reading.rate_hz, axis.rate_hz) {
-            // A part of the record keeps its place.
+            // A part of the record keeps its position.
             (Some(rate_hz), _) if reading.starts_later() => {
                 (rate_hz, axis.start.unwrap_or_default())
             }
@@ -294,7 +294,7 @@ impl Recording {
             (None, None) => return Err(without_rate(channel)),
         };
         if let (Some(assumed), None) = (&axis.assumed, reading.rate_hz) {
-            // A column without a heading is named by its number.
+            // A column without a heading is identified by its number.
             let heading = axis.stamps_in.as_deref().unwrap_or_default();
             let number = heading
                 .strip_prefix("column ")
@@ -328,10 +328,10 @@ impl Recording {
         })
     }
 
-    /// A channel whose values count as they are, without a time axis, with its unit and what is to be said of it.
+    /// A channel used without a time axis, with its unit and warnings.
     ///
     /// # Errors
-    /// If it is not there, has holes or is too large.
+    /// If it is missing, has holes or is too large.
     pub(crate) fn column(
         &self,
         choice: &ChannelChoice,
@@ -343,17 +343,17 @@ impl Recording {
         Ok((channel, unit, warning))
     }
 
-    /// The channel that is chosen, whatever its rate.
+    /// The selected channel, whatever its rate.
     pub(crate) fn channel(&self, choice: &ChannelChoice) -> Result<&Channel, Failure> {
         Ok(&self.channels[self.place(choice)?])
     }
 
-    /// The place of the channel that is chosen.
+    /// Index of the selected channel.
     pub(crate) fn place(&self, choice: &ChannelChoice) -> Result<usize, Failure> {
         let label = |channel| Channel::label(channel);
         let labels: Vec<Label> = self.channels.iter().map(label).collect();
         let place = choose(&labels, choice.channel.as_deref(), choice.flags.channel)?;
-        // What is wanted may be in a column that was left out.
+        // The requested channel may be in a column that was left out.
         let left_out = self.warnings.iter().find(|w| w.code == CELLS_WITH_UNITS);
         match left_out.filter(|_| choice.channel.is_none()) {
             Some(warning) => Err(Failure::failed(

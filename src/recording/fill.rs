@@ -1,4 +1,4 @@
-//! Samples that are missing, filled in when that is asked for.
+//! Optional filling of missing samples.
 
 use std::sync::Arc;
 
@@ -13,9 +13,9 @@ use crate::io::{Fill, Reading};
 use crate::print::plural;
 use crate::warning::Warning;
 
-/// Stretches whose times a warning gives.
+/// Number of intervals listed in a warning.
 const SAID: usize = 5;
-/// Most samples that are filled in at one place.
+/// Maximum number of samples filled at one place.
 const LONGEST: f64 = 10_000.0;
 
 /// A stretch of samples that were filled in.
@@ -30,7 +30,7 @@ pub struct FilledSpan {
 }
 
 impl Recording {
-    /// Fills in what is missing of a channel, by its place, if that is asked for. Says which gaps a given rate passes over.
+    /// Fills gaps of the channel with this index, if requested, and reports which gaps a given rate ignores.
     ///
     /// # Errors
     /// If a gap is too long to be filled.
@@ -50,7 +50,7 @@ impl Recording {
         let is_stamped = used_stamps(channel, reading).is_some();
         let whole = std::mem::take(&mut channel.samples);
         let stamps = channel.axis.stamps_s.clone().filter(|_| is_stamped);
-        // Rounding is no gap: coarse stamps are those of their line.
+        // Rounding is not a gap: coarse stamps are replaced by those of their line.
         let on_line = stamps.as_ref().and_then(|stamps_s| {
             let places = BrokenLine::of(stamps_s)?.places(stamps_s.len()).collect();
             Some((stamps_s[0], places)) as Option<(f64, Vec<usize>)>
@@ -139,7 +139,7 @@ impl Filled {
     }
 }
 
-/// What is said of the stretches that were filled in.
+/// Note about the filled intervals.
 fn said(
     name: &str,
     fill: Fill,

@@ -1,4 +1,4 @@
-//! A look at the first samples of a stream, which stay to be read.
+//! Look-ahead at the first samples of a stream.
 
 use super::block::{Block, BlockSource};
 use super::stream::ChannelStream;
@@ -8,14 +8,14 @@ use crate::warning::Warning;
 /// The first samples of a stream.
 #[derive(Debug, Default)]
 pub(crate) struct FirstSamples {
-    /// As written, up to the first that is no finite number.
+    /// As written, up to the first non-finite one.
     pub(crate) values: Vec<f64>,
-    /// Whether there are no more.
+    /// Whether these are all samples.
     pub(crate) is_all: bool,
 }
 
 impl ChannelStream {
-    /// Reads at least so many samples ahead, or all there are.
+    /// Reads at least `fewest` samples ahead, or all there are.
     ///
     /// # Errors
     /// If the source cannot be read.
@@ -47,7 +47,7 @@ impl ChannelStream {
     }
 }
 
-/// Blocks of which the first were read ahead; they are given as one.
+/// Blocks of which the first were read ahead and merged into one.
 struct HeldBlocks {
     first: Option<Block>,
     rest: Box<dyn BlockSource>,

@@ -1,4 +1,4 @@
-//! Breaks in time stamps whose rate the user gave: the samples before and behind them are joined.
+//! Breaks in time stamps when the user gave the rate: the samples before and after them are joined.
 
 use torqcomp_dsp::quality::broken_line::BrokenLine;
 
@@ -9,25 +9,25 @@ use crate::io::{Reading, digits};
 use crate::print::plural;
 use crate::warning::Warning;
 
-/// Usual steps from which on a step is a break, whole or not.
+/// Number of typical steps above which a step is a break, whole or not.
 const LONG: f64 = 10.0;
 
-/// Breaks in the stamps of samples that are placed by a given rate, as they pass.
+/// Breaks in the stamps of streamed samples placed by a given rate.
 #[derive(Debug, Default)]
 pub(super) struct JoinedBreaks {
-    /// Steps that leave out samples, and the first of them.
+    /// Number of steps that leave out samples, and the first of them.
     gaps: usize,
     first_gap: Option<IrregularStep>,
-    /// Time that is left out, in the unit of the stamps.
+    /// Total missing time, in the unit of the stamps.
     missing: f64,
-    /// Steps backwards, and the first of them.
+    /// Number of backward steps, and the first of them.
     backwards: usize,
     first_backwards: Option<IrregularStep>,
 }
 
 impl StampGrid {
-    /// The grid that stamps would lie on by themselves, where a rate is given in their place; `None` if they have no
-    /// usual step, so that nothing can be said of them.
+    /// The grid of the stamps themselves, for use when a rate is given instead; `None` if they have no typical step,
+    /// so that breaks cannot be detected.
     pub(super) fn beside_given_rate(self, stamps: &[f64]) -> Option<Self> {
         let origin = self.origin_ns as f64 * 1e-9 / self.seconds_per_unit;
         let SampleStep { step, .. } = step_of(stamps, origin)?;
@@ -43,7 +43,7 @@ impl StampGrid {
 }
 
 impl JoinedBreaks {
-    /// Looks at the next stamps; `last` is the one before them.
+    /// Examines the next stamps; `last` is the one before them.
     pub(super) fn look(&mut self, grid: &StampGrid, last: Option<f64>, stamps: &[f64]) {
         let slack = grid.quantum / grid.step;
         let before = last.into_iter().chain(stamps.iter().copied());
@@ -62,14 +62,14 @@ impl JoinedBreaks {
         }
     }
 
-    /// Takes the breaks of stamps so coarse that single steps do not show them.
+    /// Adopts the breaks of stamps too coarse for single steps to show them.
     fn look_at_coarse(&mut self, grid: &StampGrid, broken: &BrokenLine, stamps: &[f64]) {
         self.gaps = broken.breaks.len();
         self.missing = broken.missing() as f64 * grid.step;
         self.first_gap = first_missing(broken, stamps).map(|missing| missing.at);
     }
 
-    /// What is said of them.
+    /// Warning about the breaks.
     pub(super) fn warning(&self, source: &str, grid: &StampGrid) -> Option<Warning> {
         let time = |stamp: f64| grid.time_text(stamp);
         let gaps = self.first_gap.map(|gap| {
@@ -106,7 +106,7 @@ impl JoinedBreaks {
 }
 
 impl Channel {
-    /// What is said of breaks in its stamps where a rate is given in their place.
+    /// Warning about breaks in its stamps if a rate is given instead.
     pub(super) fn joined_breaks(&self, source: &str, reading: &Reading) -> Option<Warning> {
         reading.rate_hz.filter(|_| !reading.resample)?;
         let stamps_s = self.axis.stamps_s.as_ref()?;
@@ -125,8 +125,8 @@ impl Channel {
 }
 
 impl TimeAxis {
-    /// The axis of samples at a rate that the user gave, the first of them at time 0; `beside` is the grid of stamps that
-    /// they have besides.
+    /// Axis of samples at a rate given by the user, with the first at time 0; `beside` is the grid of their additional
+    /// stamps.
     pub(super) fn given(rate_hz: f64, beside: Option<StampGrid>) -> Self {
         Self {
             rate_hz: Some(rate_hz),

@@ -1,4 +1,4 @@
-//! A channel of a recording that was read whole, as a stream.
+//! Streaming of a channel of a recording that was read as a whole.
 
 use std::sync::Arc;
 
@@ -12,14 +12,14 @@ use crate::io::{ChannelChoice, Reading};
 use crate::print::plural;
 use crate::warning::Warning;
 
-/// Samples of a block.
+/// Number of samples per block.
 const SAMPLES: usize = 1 << 13;
 
 impl ChannelStream {
-    /// The channel of a recording that is chosen.
+    /// The selected channel of a recording.
     ///
     /// # Errors
-    /// If there is no such channel, its rate is unknown, or a cell of it holds no number.
+    /// If there is no such channel, its rate is unknown, or a cell is not numeric.
     pub(super) fn of_recording(
         mut recording: Recording,
         choice: &ChannelChoice,
@@ -82,27 +82,27 @@ impl ChannelStream {
     }
 }
 
-/// The stamps of a channel, if its samples are placed by them.
+/// Stamps of a channel, if its samples are placed by them.
 pub(super) fn used_stamps(channel: &Channel, reading: &Reading) -> Option<Arc<Vec<f64>>> {
     let by_stamps = matches!(channel.axis.rate_from, RateFrom::Stamps(_) | RateFrom::None);
     let wanted = reading.resample || (by_stamps && reading.rate_hz.is_none());
     channel.axis.stamps_s.clone().filter(|_| wanted)
 }
 
-/// Refuses cells without a number, among the samples and among the stamps that they are placed by.
+/// Rejects non-numeric cells among the samples, and among the stamps if these are used.
 pub(crate) fn check_cells(channel: &Channel, reading: &Reading) -> Result<(), Failure> {
     refuse_holes(channel, used_stamps(channel, reading).is_some())
 }
 
-/// Refuses samples without a number, whatever their time.
+/// Rejects non-numeric samples, whatever their time.
 pub(crate) fn check_holes(channel: &Channel) -> Result<(), Failure> {
     refuse_holes(channel, false)
 }
 
-/// Largest magnitude of a sample; the squares of larger ones are no numbers any more.
+/// Maximum magnitude of a sample; the squares of larger ones overflow.
 const LARGEST: f64 = 1e150;
 
-/// Refuses samples beyond all instruments.
+/// Rejects samples beyond the range of any instrument.
 pub(crate) fn check_size(channel: &Channel) -> Result<(), Failure> {
     let Some(row) = channel.samples.iter().position(|v| v.abs() > LARGEST) else {
         return Ok(());
@@ -157,11 +157,11 @@ fn refuse_holes(channel: &Channel, by_stamps: bool) -> Result<(), Failure> {
     })
 }
 
-/// Samples that are in memory.
+/// Samples in memory.
 struct MemoryBlocks {
     samples: Vec<f64>,
     stamps: Option<Arc<Vec<f64>>>,
-    /// Samples given so far.
+    /// Number of samples output so far.
     given: usize,
     lost: Option<Warning>,
 }

@@ -1,4 +1,4 @@
-//! A number in the messages of an MCAP file, as a stream.
+//! Streaming of a number in the messages of an MCAP file.
 
 use std::io::Read;
 
@@ -12,22 +12,22 @@ use crate::io::mcap::decode::Encoding;
 use crate::io::{ChannelChoice, Input, Reading};
 use crate::warning::Warning;
 
-/// Nanoseconds that an `f64` holds exactly: 104 days.
+/// Range in nanoseconds that an `f64` represents exactly: 104 days.
 const EXACT_NS: i64 = 1 << 53;
 
-/// Where messages come from.
+/// Origin of messages.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct MessageOrigin {
-    /// Their encoding, if it is known.
+    /// Their encoding, if known.
     pub(crate) encoding: Option<Encoding>,
     /// Time of the first sample, in ns.
     pub(crate) first_ns: i64,
-    /// What a sample's time is ahead of the file's log times, in ns.
+    /// Offset of a sample's time from the file's log time, in ns.
     pub(crate) log_offset_ns: i64,
 }
 
 impl ChannelStream {
-    /// A number in the messages of a file whose bytes are `bytes`.
+    /// A number in the messages of a file with the content `bytes`.
     pub(super) fn of_messages(
         input: &Input,
         bytes: Box<dyn Read + Send>,
@@ -89,8 +89,8 @@ impl ChannelStream {
     }
 }
 
-/// Stamps of a uniform record with as many messages, the last of them at the same time, at places that double; none if
-/// the end of the file does not say.
+/// Stamps at doubling distances of a uniform record with the same number of messages and the same end; empty if the
+/// end of the file does not give that.
 fn later(source: &SignalReader, origin_ns: i64) -> Vec<f64> {
     let Some(end) = source.end().filter(|end| end.messages > 1) else {
         return Vec::new();
@@ -117,17 +117,17 @@ fn nothing_usable(name: &str, source: SignalReader) -> Failure {
     .at(name)
 }
 
-/// Messages on their way; times are given from the first one.
+/// Streamed messages; times are relative to the first one.
 struct MessageBlocks {
     source: Option<SignalReader>,
     origin_ns: i64,
-    /// What was read and not given.
+    /// Read but not yet output.
     times_ns: Vec<i64>,
     values: Vec<f64>,
 }
 
 impl MessageBlocks {
-    /// The time axis of the first messages and of stamps `later`, of a clock named by `heading`.
+    /// Time axis from the first messages and the stamps `later`; `heading` names the clock.
     fn axis(&self, heading: &str, later: &[f64], reading: &Reading) -> Result<TimeAxis, Failure> {
         let grid = StampGrid {
             unit: "ns".to_owned(),
@@ -146,7 +146,7 @@ impl MessageBlocks {
         Ok(axis)
     }
 
-    /// A warning if a rate that was given is not that of the first messages.
+    /// A warning if a given rate contradicts the first messages.
     fn overridden(&self, heading: &str, reading: &Reading) -> Result<Option<Warning>, Failure> {
         if reading.rate_hz.is_none() {
             return Ok(None);

@@ -1,4 +1,4 @@
-//! Numbers in the messages of an MCAP file as the channels of a recording, each as a whole in memory.
+//! Numbers in the messages of an MCAP file as channels of a recording, wholly in memory.
 
 use std::sync::Arc;
 
@@ -13,11 +13,11 @@ use crate::io::{ChannelChoice, Input, Reading};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
-/// The numbers that are chosen, in that order, or the only one in the file. Their stamps are counted from the first
+/// The selected numbers in the given order, or the only one in the file. Their stamps are relative to the first
 /// sample of the first one.
 ///
 /// # Errors
-/// If the file cannot be read, or a number is not in it: then with what is there.
+/// If the file cannot be read, or a number is missing; the message lists the available ones.
 pub(super) fn read(
     input: &Input,
     choices: &[ChannelChoice],
@@ -73,11 +73,11 @@ pub(super) fn read(
 
 /// Times and values of a number.
 type Held = (Vec<i64>, Vec<f64>);
-/// What was read of a number besides.
+/// Further information about a number.
 type ReadNumber = Result<(SelectedSignal, SignalSummary), Failure>;
 
-/// The numbers that are chosen, each with its times, and what is known of them. Where a name is none as it stands, it is
-/// looked for as a part of one.
+/// The selected numbers with their times and further information. A name without an exact match is searched for as part
+/// of one.
 fn read_chosen(
     input: &Input,
     choices: &[ChannelChoice],
@@ -109,7 +109,7 @@ fn read_chosen(
     }
 }
 
-/// Topic and field of a choice. Where a topic is given, a channel is named by the field alone.
+/// Topic and field of a selection. If a topic is given, a channel is named by the field alone.
 pub(super) fn field(choice: &ChannelChoice, reading: &Reading) -> FieldChoice {
     let topic = reading.topic.clone();
     match (&topic, &choice.field, &choice.signal, &choice.channel) {
@@ -126,8 +126,8 @@ pub(super) fn field(choice: &ChannelChoice, reading: &Reading) -> FieldChoice {
     }
 }
 
-/// The number whose name is what a choice says in another case, or the only one that has it as a part; `None` if there is
-/// none, or the file can only be read once.
+/// The number whose name matches a selection ignoring case, or the only one that contains it; `None` if there is none,
+/// or the file can only be read once.
 pub(super) fn by_part(
     input: &Input,
     choice: &FieldChoice,
@@ -169,7 +169,7 @@ pub(super) fn by_part(
     }))
 }
 
-/// Which time of the messages counts.
+/// Which time of the messages to use.
 pub(crate) fn times(reading: &Reading) -> TimeOptions {
     TimeOptions {
         time: reading.time,
@@ -177,7 +177,7 @@ pub(crate) fn times(reading: &Reading) -> TimeOptions {
     }
 }
 
-/// Topic and field in one.
+/// Topic and field combined.
 pub(super) fn name(chosen: &SelectedSignal) -> String {
     match chosen.field.as_str() {
         "" => chosen.topic.clone(),
@@ -185,7 +185,7 @@ pub(super) fn name(chosen: &SelectedSignal) -> String {
     }
 }
 
-/// Which time of the messages is taken.
+/// Description of the time used.
 pub(super) fn clock(used: &TimeUsed) -> String {
     match &used.field {
         Some(field) => field.clone(),
@@ -205,12 +205,12 @@ pub(super) fn describe(chosen: &SelectedSignal) -> String {
     )
 }
 
-/// The unit that the file gives, if it is known to torqcomp.
+/// The unit given by the file, if known.
 pub(super) fn unit(chosen: &SelectedSignal) -> Option<NamedUnit> {
     NamedUnit::parse(&chosen.unit.as_ref()?.unit)
 }
 
-/// What was lost of a number, and what else should be known of it.
+/// Losses of a number, and further warnings.
 pub(super) fn losses(summary: SignalSummary) -> (Option<Warning>, Vec<Warning>) {
     let mut warnings = summary.warnings;
     let lost = summary.is_lossy.then(|| {

@@ -1,7 +1,7 @@
-//! What a recorder stored: its channels, each with its own samples, unit and time axis.
+//! Content of a recording: its channels, each with its own samples, unit and time axis.
 //!
-//! Whatever the format and dialect of a file, this is what comes out of it. Nothing is repaired:
-//! samples and stamps are as read, cells that hold no number are `NaN` and listed with their lines.
+//! This is the result for every format and dialect. Nothing is repaired: samples and stamps are as
+//! read, non-numeric cells are `NaN` and listed with their lines.
 
 mod aligned;
 mod all_samples;
@@ -56,26 +56,27 @@ pub(crate) use validator::{StreamSummary, StreamValidator};
 /// A file's content.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
-    /// Name of the file, for people.
+    /// Name of the file, for messages.
     pub source: String,
     /// `csv` for any text, `mcap`, `wav`, `uff`, `mat`, `tdms`.
     pub format: &'static str,
-    /// How it is written, for people: `LabVIEW LVM, tab-separated, decimal point, 3 segments`.
+    /// Description of the encoding, for messages:
+    /// `LabVIEW LVM, tab-separated, decimal point, 3 segments`.
     pub dialect: String,
-    /// What the head of the file says besides, as pairs of key and value.
+    /// Further header entries, as pairs of key and value.
     pub details: Vec<(String, String)>,
-    /// All channels, in the order of the file; of several segments, those of the first one first.
+    /// All channels, in the order of the file; with several segments, those of the first one first.
     pub channels: Vec<Channel>,
     /// The segments, if the file has more than one.
     pub segments: Vec<Segment>,
-    /// What a user should know about how it was read.
+    /// Warnings about how it was read.
     pub warnings: Vec<Warning>,
-    /// What was announced or begun, but is not there.
+    /// Announced or incomplete data that are missing.
     pub lost: Option<Warning>,
 }
 
 impl Recording {
-    /// Nothing yet, of a format.
+    /// An empty recording of a format.
     #[must_use]
     pub fn empty(format: &'static str, source: String) -> Self {
         Self {
@@ -110,60 +111,61 @@ pub struct Channel {
     pub name: String,
     /// Its heading as written, or `column N`.
     pub heading: String,
-    /// Its unit, if it is known to torqcomp.
+    /// Its unit, if known.
     pub unit: Option<NamedUnit>,
     /// Its unit as written, known or not.
     pub unit_text: Option<String>,
     /// Samples as written; `NaN` where there was no number.
     pub samples: Vec<f64>,
-    /// The cells that held no number, in order.
+    /// Non-numeric cells, in order.
     pub holes: Vec<Hole>,
-    /// How its samples lie in time.
+    /// Time axis.
     pub axis: TimeAxis,
-    /// The segment it belongs to, from 0, if there are several.
+    /// Its segment, from 0, if there are several.
     pub segment: Option<usize>,
-    /// Stretches of samples that were filled in.
+    /// Intervals of filled samples.
     pub filled: Vec<FilledSpan>,
     /// Whether it is marked as a result of `compensate`.
     pub is_compensated: bool,
 }
 
-/// A cell among the samples that holds no number.
+/// A non-numeric cell among the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Hole {
-    /// Its place among the samples, from 0.
+    /// Index among the samples, from 0.
     pub index: usize,
-    /// Its line in the file, from 1 (0 where there are no lines).
+    /// Line in the file, from 1 (0 if there are no lines).
     pub line: usize,
-    /// What stands there.
+    /// Content of the cell.
     pub what: HoleKind,
 }
 
-/// What stands in place of a number.
+/// Content of a cell instead of a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HoleKind {
     /// The row ends before the cell.
     Missing,
-    /// Nothing.
+    /// Empty.
     Empty,
     /// NaN, infinity, overflow.
     NonFinite,
-    /// A number with which instruments say that they have none: 9.91e37, ±9.9e37.
+    /// A number that instruments use for a missing value: 9.91e37, ±9.9e37.
     InstrumentsMark,
-    /// A text.
+    /// Text.
     Text,
 }
 
-/// Reads a recording of any format and dialect as a whole into memory: eight bytes for each number in it. Of an MCAP file that is the only number in it.
+/// Reads a recording of any format and dialect completely into memory, with eight bytes per number. From an MCAP file,
+/// that is the only number in it.
 ///
 /// # Errors
-/// If the file cannot be read, is no recording, or leaves open how it is to be read.
+/// If the file cannot be read, is not a recording, or is ambiguous.
 pub fn read(input: &Input, reading: &Reading) -> Result<Recording, Failure> {
     Recording::read(input, &[ChannelChoice::default()], reading)
 }
 
-/// Reads bytes of a format that is neither text of a table nor MCAP; `None` if they begin as none of these. `source` is
-/// the name for people.
+/// Reads bytes of a format other than text tables and MCAP; `None` if their start matches none of these. `source` is
+/// the name for messages.
 #[must_use]
 pub fn read_other_format(
     source: &str,
@@ -175,7 +177,7 @@ pub fn read_other_format(
 }
 
 impl Recording {
-    /// All channels of a text; of an MCAP file those that are chosen.
+    /// All channels of a text, or the selected ones of an MCAP file.
     ///
     /// # Errors
     /// See [`read`].
@@ -198,8 +200,8 @@ impl Recording {
         Ok(recording)
     }
 
-    /// The channels of a text, of long tables only about so many numbers; and of channels that have more, what all of
-    /// their samples come to.
+    /// The channels of a text, limited to about a number of values for long tables; and for channels with more,
+    /// statistics of all their samples.
     ///
     /// # Errors
     /// See [`read`].
@@ -223,7 +225,7 @@ impl Recording {
         file.read_first(most).map_err(|f| f.at(&name))
     }
 
-    /// Asks whether the table is transposed, if it has a few rows and hundreds of columns.
+    /// Asks whether the table is transposed, if it has few rows and hundreds of columns.
     pub(crate) fn must_not_be_transposed(&self) -> Result<(), Failure> {
         let rows = self
             .channels
@@ -236,13 +238,13 @@ impl Recording {
         }
     }
 
-    /// What was lost, and what else should be known.
+    /// Losses, and further warnings.
     pub(crate) fn all_warnings(&self) -> Vec<Warning> {
         self.lost.iter().chain(&self.warnings).cloned().collect()
     }
 }
 
-/// Refuses what only texts have.
+/// Rejects options that apply to texts only.
 pub(crate) fn refuse_for_messages(reading: &Reading) -> Result<(), Failure> {
     let given = [
         ("--time-column", reading.time_column.is_some()),
@@ -257,7 +259,7 @@ pub(crate) fn refuse_for_messages(reading: &Reading) -> Result<(), Failure> {
     )
 }
 
-/// Refuses what only WAV files have.
+/// Rejects options that apply to WAV files only.
 fn refuse_for_tables(reading: &Reading) -> Result<(), Failure> {
     let given = [("--full-scale", reading.full_scale.is_some())];
     refuse(
@@ -266,7 +268,7 @@ fn refuse_for_tables(reading: &Reading) -> Result<(), Failure> {
     )
 }
 
-/// Refuses what only messages have.
+/// Rejects options that apply to messages only.
 pub(crate) fn refuse_for_text(choice: &ChannelChoice, reading: &Reading) -> Result<(), Failure> {
     let given = [
         ("--topic", reading.topic.is_some()),

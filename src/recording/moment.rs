@@ -1,4 +1,4 @@
-//! Moments: times of a record for people, to the nanosecond, and as dates.
+//! Times of a record with nanosecond resolution, as text and as dates.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -21,7 +21,7 @@ pub struct Moment {
 }
 
 impl Moment {
-    /// A time on a clock of its own.
+    /// A time on a clock with its own origin.
     #[must_use]
     pub fn of_seconds(after_s: f64) -> Self {
         Self {
@@ -30,7 +30,7 @@ impl Moment {
         }
     }
 
-    /// The time in seconds, as far as an `f64` has it.
+    /// The time in seconds, to the precision of an `f64`.
     #[must_use]
     pub fn seconds(self) -> f64 {
         if self.origin_ns == 0 {
@@ -47,7 +47,7 @@ impl Moment {
             .saturating_add((self.after_s * 1e9).round() as i64)
     }
 
-    /// So many seconds later.
+    /// The time `seconds` later.
     #[must_use]
     pub fn later(self, seconds: f64) -> Self {
         Self {
@@ -62,7 +62,7 @@ impl Moment {
         date_and_time(self.nanoseconds()).filter(|_| self.origin_ns != 0)
     }
 
-    /// The time for people, to seven digits where none is lost in more.
+    /// The time as text, to seven digits if that loses nothing.
     #[must_use]
     pub fn short(self) -> String {
         match self.origin_ns {
@@ -71,7 +71,7 @@ impl Moment {
         }
     }
 
-    /// The time for people: every digit of it, and its date if it is one.
+    /// The time as text with all digits, and its date if it is one.
     ///
     /// ```
     /// use torqcomp::recording::moment::Moment;
@@ -113,7 +113,7 @@ impl From<Moment> for StartMoment {
     }
 }
 
-/// Nanoseconds as seconds, without zeros at the end.
+/// Nanoseconds as seconds, without trailing zeros.
 fn seconds(ns: i64) -> String {
     let sign = if ns < 0 { "-" } else { "" };
     let (whole, part) = (
@@ -124,7 +124,7 @@ fn seconds(ns: i64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// Date and time in UTC of nanoseconds since 1970, if they can be meant: from 2000 on.
+/// Date and time in UTC from nanoseconds since 1970, if plausible: from 2000 on.
 #[must_use]
 pub fn date_and_time(ns: i64) -> Option<String> {
     const YEAR_2000_NS: i64 = 946_684_800_000_000_000;
@@ -134,7 +134,7 @@ pub fn date_and_time(ns: i64) -> Option<String> {
 
 /// Date and time in UTC of seconds since 1970.
 ///
-/// The date by counting years from March of the year 0, so that leap days come last: an era of 400
+/// The date with years counted from March of year 0, so that leap days come last: an era of 400
 /// years has 146 097 days (ISO 8601, proleptic Gregorian calendar).
 pub(crate) fn utc(seconds: u64) -> String {
     let (days, of_day) = (seconds / 86_400 + 719_468, seconds % 86_400);

@@ -1,4 +1,4 @@
-//! Files that say how far they have been read.
+//! Files with a progress report of reading.
 
 use std::io::{self, Read};
 
@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::io::Input;
 use crate::progress::{Amount, Progress, Task};
 
-/// A file that is read, of known length or not.
+/// A file being read, of known length or not.
 struct Followed {
     file: Box<dyn Read + Send>,
     length: Option<Amount>,
@@ -14,7 +14,7 @@ struct Followed {
     progress: Progress,
 }
 
-/// Opens an input whose way is followed.
+/// Opens an input with progress reporting.
 ///
 /// # Errors
 /// If it cannot be opened.

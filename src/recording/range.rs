@@ -1,4 +1,4 @@
-//! A part of a record by its times.
+//! Selection of a part of a record by its times.
 
 use super::moment::Moment;
 use super::text::Clock;
@@ -6,7 +6,7 @@ use super::{Channel, Recording, TimeAxis};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::TimeRange;
 
-/// Seconds from which on a number is a time since 1970: 1973.
+/// Minimum number of seconds that is a time since 1970: 1973.
 const SINCE_1970: f64 = 1e8;
 /// Nanoseconds of a day.
 const DAY: i64 = 86_400_000_000_000;
@@ -14,7 +14,7 @@ const DAY: i64 = 86_400_000_000_000;
 /// One end of a range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum TimeBound {
-    /// A number of seconds, and the same in ns where that is more exact.
+    /// A number of seconds, and the same in ns where that is more precise.
     Seconds { seconds: f64, ns: i64 },
     /// A date with a time, or a time of day.
     Clock(Clock),
@@ -45,12 +45,12 @@ impl TimeBound {
         clock.nanoseconds.map(|_| Self::Clock(clock))
     }
 
-    /// The bound in seconds after the origin of an axis.
+    /// The bound in seconds relative to the origin of an axis.
     fn on(self, axis: &TimeAxis) -> Result<f64, Failure> {
         let start = axis.start.unwrap_or_default();
         Ok(match self {
             Self::Seconds { seconds, .. } if axis.origin_ns == 0 => seconds,
-            // Of a clock that counts from 1970, small numbers are seconds after the first sample.
+            // On a clock that counts from 1970, small numbers are relative to the first sample.
             Self::Seconds { seconds, .. }
                 if seconds < SINCE_1970 && start.seconds() >= SINCE_1970 =>
             {
@@ -113,7 +113,7 @@ impl Channel {
         Some([0, last].map(|place| self.axis.moment(self.after_s(place))))
     }
 
-    /// Time of a sample, after the origin of its axis.
+    /// Time of a sample relative to the origin of its axis.
     fn after_s(&self, place: usize) -> f64 {
         match (&self.axis.stamps_s, self.axis.rate_hz) {
             (Some(stamps), _) => stamps.get(place).copied().unwrap_or(f64::NAN),
@@ -137,7 +137,7 @@ impl Channel {
                 "--range FROM..TO: FROM must be before TO",
             ));
         }
-        // A time that is not exact is that of the sample nearby.
+        // An imprecise time means the nearest sample.
         let slack_s = self.axis.rate_hz.map_or(0.0, |hz| 1e-6 / hz);
         let is_within = |place: &usize| {
             let after_s = self.after_s(*place);

@@ -1,28 +1,28 @@
-//! Whether the numbers of a text have room in memory.
+//! Check that the numbers of a text fit in memory.
 
 use super::text::TextFile;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
 use crate::print;
 
-/// Memory for each number of a text, at least.
+/// Minimum memory per number of a text, in bytes.
 const LEAST: u64 = 8;
-/// The same with what a verb makes of the samples.
+/// The same including the processing by a command.
 const USUAL: u64 = 24;
 
-/// Memory in bytes, as far as the system says.
+/// Memory in bytes, as reported by the system.
 #[derive(Debug, Clone, Copy, Default)]
 struct Room {
-    /// What is free, or can be freed, on the machine.
+    /// Free or reclaimable memory of the machine.
     free: Option<u64>,
-    /// What this process may have in all.
+    /// Limit of this process.
     allowed: Option<u64>,
 }
 
-/// Says it beforehand if the numbers of a text, no more than so many, will take more memory than the machine has free.
+/// Warns if the numbers of a text, up to `most`, will take more memory than is free.
 ///
 /// # Errors
-/// If they cannot have room within what the process may have: before they are read or anything is written.
+/// If they exceed the limit of the process, before they are read or anything is written.
 pub(super) fn look(input: &Input, text: &TextFile, most: usize) -> Result<(), Failure> {
     let Some(path) = input.plain_file() else {
         return Ok(());
@@ -72,7 +72,7 @@ impl Room {
     }
 }
 
-/// The whole number behind a name that begins a line.
+/// The whole number after a name that begins a line.
 fn number_behind(text: &str, name: &str) -> Option<u64> {
     let rest = text.lines().find_map(|line| line.strip_prefix(name))?;
     rest.split_whitespace().next()?.parse().ok()

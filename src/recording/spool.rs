@@ -1,4 +1,4 @@
-//! The samples of a record that is gone through several times: the first in memory, all others in a scratch file.
+//! Samples of a record that is read several times: the first in memory, all others in a scratch file.
 
 use std::cell::RefCell;
 use std::io::Write;
@@ -12,18 +12,18 @@ use crate::failure::{ErrorCode, Failure};
 use crate::file_name::ShowPath;
 use crate::io::storage::Scratch;
 
-/// Samples that stay in memory.
+/// Number of samples kept in memory.
 const HELD: usize = 1 << 16;
-/// Samples that are read back at a time.
+/// Number of samples read back at a time.
 const PIECE: usize = 1 << 13;
 /// Bytes of a sample.
 const SIZE: usize = size_of::<f64>();
 
-/// Samples that take no more memory, however many there are.
+/// Samples in bounded memory.
 #[derive(Debug, Default)]
 pub(crate) struct Spool {
     held: Vec<f64>,
-    /// Those behind, if there are more.
+    /// The remaining samples, if any.
     file: Option<RefCell<Scratch>>,
     count: usize,
 }
@@ -59,7 +59,7 @@ impl Spool {
         file.get_mut().write_all(&bytes)
     }
 
-    /// Reads samples back, from a place behind those in memory on.
+    /// Reads samples back, starting after those in memory.
     fn read(&self, from: usize, piece: &mut [f64]) -> std::io::Result<()> {
         let file = self
             .file

@@ -1,4 +1,4 @@
-//! Stamps of samples that pass as a stream: the grid that they lie on.
+//! Grid of the stamps of streamed samples.
 
 use torqcomp_dsp::quality::broken_line::BrokenLine;
 
@@ -13,16 +13,16 @@ use crate::io::{Reading, digits};
 use crate::print::plural;
 use crate::warning::Warning;
 
-/// Rounding of stamps, over their step, from which on it is said.
+/// Minimum reported rounding of stamps, relative to their step.
 pub(crate) const COARSE_STAMPS: f64 = 0.25;
-/// Relative uncertainty of the rate of rounded stamps from which on it is asked for. Off by 0.2 %, the inverse response
-/// of a stand with the damping ratio 0.02 is off by 0.002/0.02 = 10 % of itself at the resonance. That is the worst: a rate
-/// of few digits is found exactly.
+/// Relative uncertainty of the rate of rounded stamps above which the user is asked. With an error of 0.2 %, the
+/// inverse response of a stand with a damping ratio of 0.02 has a relative error of 0.002/0.02 = 10 % at the resonance.
+/// That is the worst case: a rate of few digits is found exactly.
 const TOLERABLE: f64 = 2e-3;
-/// Rates, over the recorded one, that stamps may be brought to.
+/// Limits of a resampled rate relative to the recorded one.
 const RESAMPLED_RATES: (f64, f64) = (0.9, 1.4);
 
-/// How stamps are written, and their step.
+/// Format and step of stamps.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StampGrid {
     /// Their unit as written.
@@ -32,29 +32,29 @@ pub(crate) struct StampGrid {
     pub(crate) step: f64,
     /// Whether they need not be uniform, because samples are interpolated between them.
     pub(crate) resampled: bool,
-    /// Whether the text of a stamp is a number of seconds as the output writes it.
+    /// Whether the text of a stamp is a number of seconds in the format of the output.
     pub(crate) copied: bool,
-    /// Nanoseconds at which they are zero.
+    /// Origin of the stamps in ns.
     pub(crate) origin_ns: i64,
-    /// What they are rounded to, in their unit, if that is all that is wrong with them; else 0.
+    /// Quantum of their rounding, in their unit, if that is their only fault; otherwise 0.
     pub(super) quantum: f64,
-    /// Of stamps rounded so coarsely that single steps do not show it, the first place at which samples are missing.
+    /// For stamps too coarse for single steps to show it, the first place of missing samples.
     pub(super) missing: Option<MissingSamples>,
 }
 
-/// Samples that the stamps leave out at a place.
+/// Samples left out by the stamps at one place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct MissingSamples {
     /// The step over that place.
     pub(super) at: IrregularStep,
-    /// How many.
+    /// Number of samples.
     pub(super) samples: usize,
 }
 
-/// Most copies of a row: more rows of one stamp are those of a coarse clock.
+/// Maximum number of copies of a row: more rows with one stamp indicate a coarse clock.
 const MOST_COPIES: f64 = 4.0;
 
-/// What it may mean that each stamp stands in so many rows, if that is a whole number of them.
+/// Possible reasons for each stamp being in `rows` rows, if that is a whole number.
 pub(crate) fn same_stamps(rows: f64) -> String {
     let whole = rows.round();
     match (2.0..=MOST_COPIES).contains(&whole) && (rows / whole - 1.0).abs() < 1e-6 {
@@ -66,20 +66,20 @@ pub(crate) fn same_stamps(rows: f64) -> String {
     }
 }
 
-/// Where and how stamps stop being uniform.
+/// Location and kind of an irregular stamp.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct IrregularStep {
-    /// Index of the stamp that ends the step, within its block.
+    /// Index of the stamp at the end of the step, within its block.
     pub(crate) row: usize,
-    /// The stamp before it.
+    /// The preceding stamp.
     pub(crate) before: f64,
     /// The stamp itself.
     pub(crate) after: f64,
 }
 
 impl TimeAxis {
-    /// The axis of a stream whose stamps begin with `first`, in the unit of the grid; `later` are some farther on, as
-    /// far as they are known before it is read.
+    /// The axis of a stream whose stamps begin with `first`, in the unit of the grid; `later` are stamps farther on,
+    /// if known in advance.
     ///
     /// # Errors
     /// If they do not rise, or are to be resampled to a rate far from theirs.
@@ -118,10 +118,10 @@ impl TimeAxis {
         })
     }
 
-    /// Refuses a rate that the rounding of its stamps leaves open.
+    /// Rejects a rate that the rounding of its stamps leaves too uncertain.
     ///
     /// # Errors
-    /// If the rates that the stamps allow differ too much.
+    /// If the rates permitted by the stamps differ too much.
     pub(super) fn check_rounding(&self) -> Result<(), Failure> {
         let of_stamps = matches!(self.rate_from, RateFrom::Stamps(_));
         let (Some(grid), Some(rate_hz), true) = (&self.grid, self.rate_hz, of_stamps) else {
@@ -140,7 +140,7 @@ impl TimeAxis {
 }
 
 impl StampGrid {
-    /// Stamps in seconds, their step still unknown.
+    /// Stamps in seconds, with a step to be determined.
     pub(super) fn of_seconds() -> Self {
         Self {
             unit: "s".to_owned(),
@@ -165,7 +165,7 @@ impl StampGrid {
         grid
     }
 
-    /// Lets stamps deviate by their rounding, if that is all that is wrong with them.
+    /// Permits deviations of stamps due to rounding, if that is their only fault.
     fn allow_rounding(&mut self, stamps: &[f64]) {
         if self.first_irregular(None, stamps).is_some() {
             let origin = self.origin_ns as f64 * 1e-9 / self.seconds_per_unit;
@@ -179,7 +179,7 @@ impl StampGrid {
         }
     }
 
-    /// Whether stamps are so coarse that several samples may share one: their times are then those of the grid.
+    /// Whether stamps are so coarse that several samples may share one; their times are then those of the grid.
     pub(crate) fn is_coarse(&self) -> bool {
         self.quantum > self.step
     }
@@ -189,8 +189,8 @@ impl StampGrid {
         !self.resampled && self.quantum > COARSE_STAMPS * self.step
     }
 
-    /// Refuses the rate of coarsely rounded stamps if its standard uncertainty, that of a rectangular distribution, is
-    /// that of rates too far apart.
+    /// Rejects the rate of coarsely rounded stamps if its standard uncertainty (rectangular distribution) is too
+    /// large.
     fn check_rounding(&self, rate_hz: f64, std_hz: f64) -> Result<(), Failure> {
         let part = 3.0_f64.sqrt() * std_hz / rate_hz;
         if !self.is_rounded_coarsely() || part <= TOLERABLE {
@@ -208,8 +208,8 @@ impl StampGrid {
         ))
     }
 
-    /// A warning if stamps are rounded so coarsely that single steps mean little; `span` is the time that they cover, in
-    /// their unit.
+    /// A warning if stamps are rounded so coarsely that single steps mean little; `span` is the time that they cover,
+    /// in their unit.
     pub(super) fn rounded_warning(&self, source: &str, span: f64) -> Option<Warning> {
         let of_seconds = self.seconds_per_unit;
         let rate_hz = 1.0 / (self.step * of_seconds);
@@ -228,15 +228,15 @@ impl StampGrid {
         })
     }
 
-    /// First stamp that does not follow the one before it by the uniform step. `last` is the stamp
-    /// before the first of them. Of stamps that are resampled, the first that runs backwards.
+    /// First stamp that does not follow the preceding one by the uniform step. `last` is the stamp
+    /// before the first of them. For resampled stamps, the first that runs backwards.
     pub(super) fn first_irregular(
         &self,
         last: Option<f64>,
         times: &[f64],
     ) -> Option<IrregularStep> {
         let (&first, &end) = (times.first()?, times.last()?);
-        // A stamp cannot be more exact than its own last bit.
+        // The precision of a stamp is limited by its last bit.
         let rounding = 2.0 * f64::EPSILON * first.abs().max(end.abs()) + self.quantum;
         let (low, high) = if self.resampled {
             (0.0, f64::INFINITY)
@@ -264,7 +264,7 @@ impl StampGrid {
         })
     }
 
-    /// Says where samples are missing, and what to do.
+    /// Text about missing samples, and what to do.
     fn explain_missing(&self, missing: &MissingSamples) -> String {
         let Self { unit, step, .. } = self;
         let (before, after) = (missing.at.before, missing.at.after);
@@ -283,7 +283,7 @@ impl StampGrid {
         )
     }
 
-    /// The failure of samples that are missing between coarse stamps.
+    /// Failure for samples missing between coarse stamps.
     ///
     /// # Errors
     /// If there are any and the samples are placed by their stamps.
@@ -311,7 +311,7 @@ impl StampGrid {
         self.origin_ns.saturating_add(after_ns.round() as i64)
     }
 
-    /// A stamp as the file has it, with its unit.
+    /// A stamp as written in the file, with its unit.
     pub(super) fn time_text(&self, stamp: f64) -> String {
         match self.origin_ns {
             0 => format!("{} {}", digits::text(stamp, 12), self.unit),
@@ -324,7 +324,7 @@ impl StampGrid {
         stamp * self.seconds_per_unit + self.origin_ns as f64 * 1e-9
     }
 
-    /// Says what is wrong at a break and what to do.
+    /// Text about a break, and what to do.
     pub(super) fn explain(&self, found: &IrregularStep) -> String {
         let Self { unit, step, .. } = self;
         let time = |stamp| self.time_text(stamp);
@@ -369,12 +369,12 @@ pub(super) fn first_missing(broken: &BrokenLine, stamps: &[f64]) -> Option<Missi
     })
 }
 
-/// Whether a step of so many usual ones, known to within `slack` of one, leaves out whole samples.
+/// Whether a step of `length` typical ones, within `slack` of an integer, leaves out whole samples.
 pub(super) fn is_gap(length: f64, slack: f64) -> bool {
     length > 1.5 + slack && (length - length.round()).abs() < 0.1 + slack
 }
 
-/// The rates between two steps in s, in words.
+/// The rates corresponding to two steps in s, as text.
 pub(crate) fn rates_of([least_s, largest_s]: [f64; 2]) -> String {
     let rate = |step_s: f64, places| digits::text(1.0 / step_s, places);
     let differ = |places: &u32| rate(least_s, *places) != rate(largest_s, *places);
@@ -393,7 +393,7 @@ pub(crate) fn is_uniform(stamps_s: &[f64], rate_hz: f64) -> bool {
 }
 
 impl Channel {
-    /// Whether its stamps, if they place it or a given rate does in their stead, are rounded coarsely.
+    /// Whether its stamps, if they are used or replaced by a given rate, are rounded coarsely.
     pub(super) fn has_coarse_stamps(&self) -> bool {
         let of_stamps = matches!(self.axis.rate_from, RateFrom::Stamps(_) | RateFrom::Given);
         let stamps_s = self.axis.stamps_s.as_ref().filter(|_| of_stamps);
@@ -405,7 +405,7 @@ impl Channel {
         })
     }
 
-    /// A warning if the stamps that it is placed by are rounded coarsely.
+    /// A warning if the stamps in use are rounded coarsely.
     pub(super) fn rounded_stamps(&self, source: &str, rate_hz: f64) -> Option<Warning> {
         let by_stamps = matches!(self.axis.rate_from, RateFrom::Stamps(_));
         let stamps_s = self.axis.stamps_s.as_ref().filter(|_| by_stamps)?;
@@ -414,10 +414,10 @@ impl Channel {
         grid.rounded_warning(source, span_s)
     }
 
-    /// Refuses a rate that the rounding of the stamps leaves open.
+    /// Rejects a rate that the rounding of the stamps leaves too uncertain.
     ///
     /// # Errors
-    /// If the rates that the stamps allow differ too much.
+    /// If the rates permitted by the stamps differ too much.
     pub(super) fn check_rounding(&self, rate_hz: f64) -> Result<(), Failure> {
         let axis = &self.axis;
         let by_stamps = matches!(axis.rate_from, RateFrom::Stamps(_));
@@ -431,7 +431,7 @@ impl Channel {
         }
     }
 
-    /// The first of its stamps that is not uniform, if it is placed by stamps.
+    /// The first of its stamps that is not uniform, if stamps are used.
     pub(super) fn irregular(&self, rate_hz: f64) -> Option<Failure> {
         let by_stamps = matches!(self.axis.rate_from, RateFrom::Stamps(_));
         let stamps_s = self.axis.stamps_s.as_ref().filter(|_| by_stamps)?;
@@ -450,7 +450,7 @@ impl Channel {
     }
 }
 
-/// Index of the first step that is not good. Looks at many at once, since there rarely is one.
+/// Index of the first bad step. Tests many at once, since there rarely is one.
 fn first_step(times: &[f64], good: &impl Fn(f64, f64) -> bool) -> Option<usize> {
     const TOGETHER: usize = 64;
     let steps = times.len().saturating_sub(1);
@@ -463,7 +463,7 @@ fn first_step(times: &[f64], good: &impl Fn(f64, f64) -> bool) -> Option<usize> 
     (start..steps).find(|i| !is_good(*i))
 }
 
-/// Refuses to bring stamps to a rate far from the recorded one.
+/// Rejects resampling to a rate far from the recorded one.
 pub(super) fn check_resampled(rate_hz: f64, recorded_hz: f64) -> Result<(), Failure> {
     let (low, high) = RESAMPLED_RATES;
     if (low * recorded_hz..=high * recorded_hz).contains(&rate_hz) {

@@ -1,4 +1,4 @@
-//! One channel of a recording, open for reading block by block, whatever the format of the file.
+//! One channel of a recording, read block by block, whatever the format of the file.
 
 use std::io::{Cursor, Read};
 
@@ -16,41 +16,41 @@ use crate::io::{ChannelChoice, HEAD, Input, Reading};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
-/// A channel of a recording, chosen and open for reading.
+/// A selected channel of a recording, open for reading.
 pub(crate) struct ChannelStream {
-    /// Name of the file, for people.
+    /// Name of the file, for messages.
     pub(crate) source: String,
-    /// How the file is written, for people.
+    /// Description of the file's encoding, for messages.
     pub(crate) dialect: String,
     /// Name of the channel, without the unit.
     pub(crate) name: String,
-    /// Unit of its samples, if it is known.
+    /// Unit of its samples, if known.
     pub(crate) unit: Option<NamedUnit>,
-    /// Its unit as the file writes it, known or not.
+    /// Its unit as written in the file, known or not.
     pub(crate) unit_text: Option<String>,
-    /// Whether it is a result of `compensate`: the stand's response is no longer in it.
+    /// Whether it is a result of `compensate`, without the stand's response.
     pub(crate) is_compensated: bool,
-    /// How its samples lie in time.
+    /// Time axis.
     pub(crate) time: TimeAxis,
-    /// Samples a second.
+    /// Sampling rate in Hz.
     pub(crate) rate_hz: f64,
-    /// Time of the first sample: its stamp, or where the file or the user says it starts.
+    /// Time of the first sample: its stamp, or the start given by the file or the user.
     pub(crate) start: Moment,
-    /// Of messages, what a copy of their file needs to know.
+    /// For messages, data needed to copy their file.
     pub(crate) origin: Option<MessageOrigin>,
-    /// Stretches of samples that were filled in.
+    /// Intervals of filled samples.
     pub(crate) filled: Vec<FilledSpan>,
-    /// Whether irregular stamps are only said.
+    /// Whether irregular stamps only cause a warning.
     pub(super) any_steps: bool,
-    /// What is known to be odd before reading.
+    /// Warnings known before reading.
     pub(super) warnings: Vec<Warning>,
     pub(super) blocks: Box<dyn BlockSource>,
-    /// How the rows are written, if they are of text.
+    /// Format of the rows, for text.
     pub(super) text: Option<TextLines>,
 }
 
 impl ChannelStream {
-    /// The channel as a stand takes it.
+    /// The channel in the form required by a stand.
     pub(crate) fn channel(&self) -> RecordedChannel<'_> {
         RecordedChannel {
             name: &self.name,
@@ -59,10 +59,10 @@ impl ChannelStream {
         }
     }
 
-    /// Opens a file, finds the channel and its time axis.
+    /// Opens a file and finds the channel and its time axis.
     ///
     /// # Errors
-    /// If the file cannot be read, holds no recording, or leaves open what is to be read.
+    /// If the file cannot be read, is not a recording, or the channel is ambiguous.
     pub(crate) fn open(
         input: &Input,
         choice: &ChannelChoice,
@@ -109,7 +109,7 @@ impl ChannelStream {
         Self::of_text(input, file, choice, reading).map_err(|f| f.at(&name))
     }
 
-    /// The channel of a text that is chosen, row by row.
+    /// The selected channel of a text, row by row.
     fn of_text(
         input: &Input,
         file: TextFile,
@@ -119,7 +119,7 @@ impl ChannelStream {
         let first_rows = file.recording.clone();
         let place = first_rows.place(choice)?;
         let selection = first_rows.select_at(place, choice, reading)?;
-        // Which sample has a stamp farther on cannot be counted where several share one.
+        // If several samples share a stamp, the index of a sample farther on is unknown.
         let is_coarse = selection.channel.has_coarse_stamps();
         if is_coarse {
             return Self::of_recording(file.read()?, choice, reading);
@@ -169,8 +169,8 @@ impl ChannelStream {
         })
     }
 
-    /// Splits the stream into the parts that run side by side: getting blocks of at least so many
-    /// samples, reading their text, and looking at them in order.
+    /// Splits the stream into parts that run in parallel: reading blocks of at least `fewest`
+    /// samples, parsing their text, and examining them in order.
     pub(crate) fn into_parts(
         mut self,
         fewest: usize,
@@ -189,8 +189,8 @@ impl ChannelStream {
     }
 }
 
-/// Whether the stamps of a text are read beside its samples: a rate in the head is better than that of rounded stamps, but
-/// only stamps show a gap.
+/// Whether the stamps of a text are read in addition to its samples: a header rate is better than that of rounded
+/// stamps, but only stamps show a gap.
 fn stamp_use(selection: &Selection, reading: &Reading) -> StampUse {
     let stamps_s = selection.channel.axis.stamps_s.as_ref();
     let are_checked = reading.rate_hz.is_none()
@@ -204,7 +204,7 @@ fn stamp_use(selection: &Selection, reading: &Reading) -> StampUse {
     }
 }
 
-/// How stamps are written, their step still unknown.
+/// Format of stamps, with a step to be determined.
 fn grid_of(stamps: &StampColumn) -> StampGrid {
     StampGrid {
         unit: stamps.unit.to_owned(),
@@ -215,12 +215,12 @@ fn grid_of(stamps: &StampColumn) -> StampGrid {
     }
 }
 
-/// The grid that stamps lie on by themselves.
+/// The grid of the stamps themselves.
 fn beside_given_rate(stamps: StampColumn) -> Option<StampGrid> {
     grid_of(&stamps).beside_given_rate(&stamps.first)
 }
 
-/// The axis of a column of stamps of which more will be read; a rate in the head is better than that of rounded stamps.
+/// Axis of a partly read column of stamps; a header rate is better than that of rounded stamps.
 fn axis_of_stamps(
     of_first_rows: &TimeAxis,
     stamps: &StampColumn,

@@ -10,13 +10,13 @@ use super::text::ChannelPlan;
 use super::validator::{StreamSummary, StreamValidator};
 use crate::failure::Failure;
 
-/// A channel on a uniform time axis, block by block; interpolated where that is asked for.
+/// A channel on a uniform time axis, block by block; interpolated if requested.
 pub(crate) struct UniformStream {
     /// Time of the first sample.
     pub(crate) start: Moment,
-    /// Samples a second.
+    /// Sampling rate in Hz.
     pub(crate) rate_hz: f64,
-    /// Standard uncertainty of that, if it comes from stamps.
+    /// Its standard uncertainty, if it comes from stamps.
     pub(crate) rate_std_hz: Option<f64>,
     blocks: Box<dyn BlockSource>,
     plan: Option<ChannelPlan>,
@@ -27,10 +27,10 @@ pub(crate) struct UniformStream {
 }
 
 impl UniformStream {
-    /// Before the first block.
+    /// Starts before the first block.
     ///
     /// # Errors
-    /// If the rate is none.
+    /// If the rate is invalid.
     pub(crate) fn of(stream: ChannelStream) -> Result<Self, Failure> {
         let (rate_hz, start) = (stream.rate_hz, stream.start);
         let rate_std_hz = stream.time.rate_std_hz;
@@ -52,8 +52,8 @@ impl UniformStream {
         })
     }
 
-    /// Appends the samples of the next block; `convert` brings them to the units wanted, or says which cannot be. `false` at
-    /// the end.
+    /// Appends the samples of the next block; `convert` converts them to the requested unit, or reports which cannot be
+    /// converted. `false` at the end.
     ///
     /// # Errors
     /// The first row that cannot be read or converted, with its line.
@@ -81,7 +81,8 @@ impl UniformStream {
         Ok(true)
     }
 
-    /// Appends what interpolation has kept back; what the file held, and what was interpolated.
+    /// Appends the samples held back by interpolation; returns the summary of the file and of the
+    /// interpolation.
     ///
     /// # Errors
     /// If there were fewer than two samples.
@@ -94,9 +95,9 @@ impl UniformStream {
     }
 }
 
-/// Where the samples of a record are kept.
+/// Storage of the samples of a record.
 pub(crate) trait KeepSamples: Default {
-    /// Keeps samples that follow those before.
+    /// Appends samples.
     ///
     /// # Errors
     /// If there is no room.
@@ -116,19 +117,19 @@ pub(crate) struct UniformRecord<S = Vec<f64>> {
     pub(crate) samples: S,
     /// Time of the first one.
     pub(crate) start: Moment,
-    /// Samples a second.
+    /// Sampling rate in Hz.
     pub(crate) rate_hz: f64,
-    /// Standard uncertainty of that, if it comes from stamps.
+    /// Its standard uncertainty, if it comes from stamps.
     pub(crate) rate_std_hz: Option<f64>,
-    /// What the file held.
+    /// Summary of the file.
     pub(crate) summary: StreamSummary,
-    /// What was interpolated, if anything.
+    /// Summary of the interpolation, if any.
     pub(crate) resampled: Option<Resampled>,
 }
 
 impl<S: KeepSamples> UniformRecord<S> {
-    /// Reads a channel to its end; `convert` brings its samples to the units wanted, or says which
-    /// cannot be.
+    /// Reads a channel to its end; `convert` converts its samples to the requested unit, or reports
+    /// which cannot be converted.
     ///
     /// # Errors
     /// The first row that cannot be read or converted, with its line.

@@ -1,4 +1,4 @@
-//! What is wrong with a channel, found while its blocks pass in order.
+//! Faults of a channel, detected while its blocks pass in order.
 
 use super::TimeAxis;
 use super::block::{Block, BlockSource};
@@ -9,21 +9,21 @@ use crate::failure::{ErrorCode, ErrorPlace, Failure, RowKind};
 use crate::print::plural;
 use crate::warning::Warning;
 
-/// Code of the warning that stamps are irregular.
+/// Code of the warning about irregular stamps.
 const IRREGULAR: &str = "irregular-stamps";
-/// Difference of the mean rate from that of the first rows that is worth a warning.
+/// Minimum reported relative difference of the mean rate from that of the first rows.
 const RATE_DRIFT: f64 = 1e-4;
 
-/// Looks at the blocks in order: at what one alone cannot know.
+/// Examines the blocks in order, for faults that a single one cannot show.
 #[derive(Debug)]
 pub(crate) struct StreamValidator {
     source: String,
     /// What a row is called: `line`, `message`.
     row_kind: RowKind,
-    /// Of a text, how it is written.
+    /// For a text, the format of its rows.
     text: Option<TextLines>,
     time: TimeAxis,
-    /// Lines before the next block.
+    /// Number of lines before the next block.
     lines: usize,
     samples: usize,
     first_stamp: Option<f64>,
@@ -32,19 +32,19 @@ pub(crate) struct StreamValidator {
     empty_line: Option<usize>,
     lost: Option<Warning>,
     warnings: Vec<Warning>,
-    /// Breaks in stamps that a given rate passes over.
+    /// Breaks in stamps that a given rate ignores.
     joined: JoinedBreaks,
-    /// Whether irregular stamps are only said.
+    /// Whether irregular stamps only cause a warning.
     any_steps: bool,
 }
 
-/// How the rows of a text are written, and what is known of its lines so far.
+/// Format of the rows of a text, and the state of its lines so far.
 #[derive(Debug)]
 pub(super) struct TextLines {
     pub(super) plan: ChannelPlan,
     layout: Layout,
     notes: LineNotes,
-    /// Whether a line said that the data end.
+    /// Whether a line marked the end of the data.
     ended: bool,
 }
 
@@ -60,12 +60,12 @@ impl TextLines {
     }
 }
 
-/// What a whole stream held.
+/// Summary of a whole stream.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StreamSummary {
-    /// What was lost, if anything.
+    /// Losses, if any.
     pub(crate) lost: Option<Warning>,
-    /// What else should be known.
+    /// Further warnings.
     pub(crate) warnings: Vec<Warning>,
 }
 
@@ -95,7 +95,7 @@ impl StreamValidator {
         }
     }
 
-    /// Takes the next block.
+    /// Examines the next block.
     ///
     /// # Errors
     /// The first row that cannot be read, and the first stamp that is not uniform, with its line.
@@ -145,7 +145,7 @@ impl StreamValidator {
         }
     }
 
-    /// Says once that the stamps are irregular.
+    /// Warns once about irregular stamps.
     fn say_irregular(&mut self, line: usize, found: &IrregularStep) {
         if !self.warnings.iter().any(|w| w.code == IRREGULAR) {
             let place = ErrorPlace::of_row(&self.source, self.row_kind, line);
@@ -154,7 +154,7 @@ impl StreamValidator {
         }
     }
 
-    /// What only lines of text can have wrong with them.
+    /// Examines faults that only lines of text can have.
     fn look_at_lines(&mut self, block: &Block) -> Result<(), Failure> {
         let rows = &block.rows;
         if let Some(text) = &mut self.text {
@@ -182,7 +182,7 @@ impl StreamValidator {
         Ok(())
     }
 
-    /// Ends the data before a line that is no row, unless another table begins there.
+    /// Ends the data before a line that is not a row, unless another table begins there.
     fn end(&mut self, block: &Block) -> Result<(), Failure> {
         let line = nth_line(&block.text, block.rows.lines);
         if !is_end_of_data(&line) {
@@ -196,10 +196,10 @@ impl StreamValidator {
         Ok(())
     }
 
-    /// Ends the stream; `blocks` gave its blocks.
+    /// Ends the stream; `blocks` provided its blocks.
     ///
     /// # Errors
-    /// If it held fewer than two samples.
+    /// If it had fewer than two samples.
     pub(crate) fn finish(mut self, blocks: &mut dyn BlockSource) -> Result<StreamSummary, Failure> {
         let (lost, warnings) = blocks.finish();
         if self.samples < 2 {
@@ -237,7 +237,7 @@ impl StreamValidator {
         })
     }
 
-    /// A failure at a row of the block that was accepted last.
+    /// A failure at a row of the last accepted block.
     pub(crate) fn failure_at_row(&self, block: &Block, row: usize, message: &str) -> Failure {
         let before = match &self.text {
             Some(_) => block.rows.lines,
@@ -286,7 +286,7 @@ impl StreamValidator {
             .or(block.irregular)
     }
 
-    /// A row that cannot be read.
+    /// Failure for an unreadable row.
     fn bad_row(&self, block: &Block, problem: Problem) -> Failure {
         let line = self.lines + problem.line + 1;
         let text = nth_line(&block.text, problem.line);
@@ -303,8 +303,8 @@ impl StreamValidator {
         text.map_or_else(String::new, |text| text.plan.describe(line, cell))
     }
 
-    /// Says so if the mean rate is not that which was told before all was read: `steps` are those between the first
-    /// and the last stamp, off by up to `rounding` of one.
+    /// Warns if the mean rate differs from the one given before all was read: `steps` are those between the first
+    /// and the last stamp, with an error of up to `rounding` of one.
     fn look_at_drift(&mut self, steps: f64, rounding: f64) {
         let samples = (self.samples - 1) as f64;
         let Some(rate_hz) = self.time.rate_hz else {

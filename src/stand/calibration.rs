@@ -1,4 +1,4 @@
-//! From the recorded channel to the applied quantity: unit, calibration, response.
+//! Conversion of a recorded channel to the applied quantity: unit, calibration, response.
 
 use torqcomp_dsp::conversion::Conversion;
 use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit, UnitSystem};
@@ -10,65 +10,67 @@ use crate::print::rounded;
 use crate::unit::{NamedUnit, OF_FULL_SCALE, RecordedChannel};
 use crate::warning::Warning;
 
-/// What acts on the stand: its name, and the unit it is printed in.
+/// The applied quantity: its name and printed unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Applied {
     /// `torque`, `force`, or `applied` for anything else.
     pub name: &'static str,
-    /// Unit it is printed in.
+    /// Printed unit.
     pub unit: String,
     /// SI units per printed unit.
     pub factor: f64,
 }
 
-/// How one channel of a record becomes the applied quantity.
+/// Conversion of one channel of a record to the applied quantity.
 #[derive(Debug, Clone)]
 pub struct Calibration {
     /// SI units per unit of the record.
     pub recorded_factor: f64,
-    /// What the record is; `None` for torque and what only a static gain knows.
+    /// The recorded signal; `None` for torque and for a record covered only by a static gain.
     pub signal: Option<TransducerSignal>,
-    /// From the record in SI units to the applied quantity in SI units, at rest.
+    /// Static conversion from the record to the applied quantity, both in SI units.
     pub conversion: Conversion,
-    /// Constant that a diagnosis found in the records, as the applied quantity at rest in SI units.
+    /// Constant found in the records by a diagnosis, as static applied quantity in SI units.
     pub zero: f64,
-    /// Standard uncertainty that the given record at no load brings, in SI units of the applied quantity.
+    /// Standard uncertainty due to the given record at no load, in SI units of the applied quantity.
     pub zero_std: Option<f64>,
-    /// What comes out.
+    /// Result of the conversion.
     pub applied: Applied,
-    /// How the static constant came about, for people.
+    /// Origin of the static constant, as text.
     pub described: String,
     /// Uncertainty of the static constant.
     pub std: ConstantStd,
-    /// The record at no load as the stand file gives it, with what it is of; in SI units.
+    /// The record at no load from the stand file, with its signal, in SI units.
     pub given_zero: Option<(TransducerSignal, f64)>,
-    /// Rated torque of the transducer in N m, if it is given.
+    /// Rated torque of the transducer in N m, if given.
     pub rated_n_m: Option<f64>,
-    /// What was assumed on the way.
+    /// Assumptions made.
     pub warnings: Vec<Warning>,
 }
 
-/// Largest part of the given record at no load within which a record lies that it does not belong to.
+/// Largest magnitude, relative to the given record at no load, of a record to which that does not
+/// belong.
 const NEAR_NOTHING: f64 = 0.1;
-/// Torque over the rated one up to which a full load in the other direction explains such a record.
+/// Torque relative to the rated one up to which a full load in the opposite direction explains such
+/// a record.
 const FULL_LOAD: f64 = 1.2;
-/// Voltage in V beyond which no bridge amplifier goes.
+/// Maximum output voltage of a bridge amplifier in V.
 const MOST_VOLTS: f64 = 30.0;
 
-/// What a record can contradict of its calibration.
+/// Checks of a record against its calibration.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RecordedLevels {
-    /// The given record at no load, for people; empty if there is none.
+    /// The given record at no load, as text; empty if none.
     zero: String,
-    /// The applied quantity of a record of nothing, in SI units.
+    /// The applied quantity for a record of zero, in SI units.
     of_nothing: f64,
-    /// The applied quantity for each volt, in SI units, where the record is in V.
+    /// The applied quantity per volt, in SI units, for a record in V.
     per_volt: Option<f64>,
     rated_n_m: Option<f64>,
 }
 
 impl Calibration {
-    /// What a record can contradict of it.
+    /// Checks of a record against this calibration.
     #[must_use]
     pub fn levels(&self) -> RecordedLevels {
         let of = |recorded: f64| self.conversion.convert(recorded).ok();
@@ -89,15 +91,15 @@ impl Calibration {
 }
 
 impl RecordedLevels {
-    /// Warnings about samples in SI units of the applied quantity, as recorded; `scale` makes them ones of the printed unit.
+    /// Warnings about recorded samples in SI units of the applied quantity; `scale` converts them to the printed unit.
     #[must_use]
     pub fn warnings(&self, samples: &[f64], scale: f64, unit: &str) -> Vec<Warning> {
         let far = self.zero_far(samples, scale, unit);
         far.into_iter().chain(self.volts(samples)).collect()
     }
 
-    /// A warning if the record is next to nothing beside the given record at no load, so that the result is hardly more than
-    /// an offset.
+    /// A warning if the record is negligible compared with the given record at no load, so that the result is little
+    /// more than an offset.
     fn zero_far(&self, samples: &[f64], scale: f64, unit: &str) -> Option<Warning> {
         let offset = self.of_nothing;
         let is_near = |t: &f64| (t - offset).abs() <= NEAR_NOTHING * offset.abs();
@@ -123,7 +125,7 @@ impl RecordedLevels {
         ))
     }
 
-    /// A warning if most of a record in V is more than a bridge amplifier gives.
+    /// A warning if most of a record in V exceeds the output of a bridge amplifier.
     fn volts(&self, samples: &[f64]) -> Option<Warning> {
         let per_volt = self.per_volt?;
         let volts = samples
@@ -171,7 +173,7 @@ impl Applied {
     }
 }
 
-/// What a unit of the applied quantity stands for, in the units wanted.
+/// The applied quantity for its unit, in the requested unit system.
 ///
 /// # Errors
 /// If the unit is not known.
@@ -193,7 +195,7 @@ pub fn applied_by_unit(text: &str, units: UnitSystem) -> Result<Applied, Failure
 }
 
 impl Calibration {
-    /// Of a channel that is compensated already: it is the applied quantity in its unit.
+    /// Calibration of an already compensated channel: it is the applied quantity in its unit.
     ///
     /// # Errors
     /// If the unit is not known.
@@ -228,7 +230,7 @@ impl Stand {
     /// The calibration of a channel.
     ///
     /// # Errors
-    /// If its unit is not known, or the stand does not say how it becomes torque.
+    /// If its unit is unknown, or the stand file does not define its conversion to torque.
     pub fn calibration(
         &self,
         channel: RecordedChannel,
@@ -277,7 +279,7 @@ impl Stand {
         (Some(*of) == signal).then_some(zero)
     }
 
-    /// What the standard uncertainty of the record at no load is as torque, in N m.
+    /// Standard uncertainty of the record at no load as torque, in N m.
     fn zero_std(&self, signal: Option<TransducerSignal>, conversion: &Conversion) -> Option<f64> {
         let of_calibration = || {
             let measured = self.calibration.as_ref()?;
@@ -290,7 +292,7 @@ impl Stand {
         Some(0.5 * (torque(1.0)? - torque(-1.0)?).abs())
     }
 
-    /// A warning if the file gives the record at no load in another quantity than the record's.
+    /// A warning if the file gives the record at no load in a quantity other than the record's.
     fn unused_zero(&self, signal: Option<TransducerSignal>, named: &NamedUnit) -> Option<Warning> {
         let (of, zero) = self.recorder.zero.as_ref()?;
         (zero.value() != 0.0 && Some(*of) != signal).then(|| {
@@ -306,12 +308,12 @@ impl Stand {
         })
     }
 
-    /// Rated torque of the transducer in N m, if `[calibration]` gives it.
+    /// Rated torque of the transducer in N m, if given in `[calibration]`.
     fn rated_n_m(&self) -> Option<f64> {
         self.calibration.as_ref()?.rated_n_m
     }
 
-    /// Recorded over applied quantity at rest, if the stand file gives it.
+    /// Static gain, recorded over applied quantity, if the stand file gives it.
     pub(crate) fn static_gain(&self) -> Option<&super::StaticGain> {
         self.mechanics.as_ref()?.static_gain.as_ref()
     }
@@ -361,7 +363,7 @@ impl Stand {
     }
 }
 
-/// The question for a unit.
+/// Failure that asks for a unit.
 fn without_unit(channel: RecordedChannel) -> Failure {
     let name = channel.name;
     match channel.unit_text {
@@ -395,7 +397,7 @@ fn without_unit(channel: RecordedChannel) -> Failure {
     }
 }
 
-/// Why a unit gives no torque, with the question that settles it.
+/// Failure for a unit that gives no torque, with the question that resolves it.
 fn no_torque(channel: &str, named: &NamedUnit) -> Failure {
     let text = &named.text;
     if named.unit.ratio_of() == Some(RatioOf::Anything) {

@@ -1,4 +1,4 @@
-//! Reading what a drawing gives: the beam, the parts of the inertia, the friction.
+//! Parsing of drawing data: the beam, the parts of the inertia, the friction.
 
 use torqcomp_model::{Beam, CrossSection, Estimate, Kind, ModelError, Part, Segment};
 
@@ -8,12 +8,12 @@ use crate::failure::Failure;
 use crate::print::short;
 use crate::warning::Warning;
 
-/// Elastic moduli of solids, from rubber to diamond.
+/// Range of elastic moduli of solids, from rubber to diamond.
 const SOLID_PA: std::ops::RangeInclusive<f64> = 1e6..=1.3e12;
-/// Elastic moduli of beams, from plastics to hard metal.
+/// Range of elastic moduli of beams, from plastics to hard metal.
 const BEAM_PA: std::ops::RangeInclusive<f64> = 1e9..=7e11;
 
-/// A warning about a modulus that no usual beam has.
+/// A warning about an unusual modulus.
 pub(super) fn unusual_modulus(beam: &BeamDrawing) -> Option<Warning> {
     let modulus_pa = beam.modulus.value();
     (!BEAM_PA.contains(&modulus_pa)).then(|| {
@@ -27,7 +27,7 @@ pub(super) fn unusual_modulus(beam: &BeamDrawing) -> Option<Warning> {
     })
 }
 
-/// The shape of a beam's section and the lengths that it is made of.
+/// Shape of a beam's section and its dimensions.
 struct BeamShape {
     word: &'static str,
     sizes: Vec<Estimate>,
@@ -54,7 +54,7 @@ impl BeamShape {
         })
     }
 
-    /// The section with those sizes in m.
+    /// The section with these dimensions in m.
     fn of(&self, sizes: &[f64]) -> Result<CrossSection, ModelError> {
         let made = match self.word {
             "circle" => CrossSection::circle(sizes[0]),
@@ -124,7 +124,7 @@ pub(super) fn beam(section: &Section) -> Result<BeamDrawing, Failure> {
     })
 }
 
-/// Stiffness of the beam as a slender one, uncertainties of the drawing carried through.
+/// Stiffness as a slender beam, with the uncertainties of the drawing propagated.
 fn slender_stiffness(
     section: &Section,
     shape: &BeamShape,
@@ -141,8 +141,7 @@ fn slender_stiffness(
     derived(section, Kind::AngularStiffness, &inputs, stiffness)
 }
 
-/// Relative standard uncertainty of the torque per strain of a slender beam, whose lengths and modulus are those of the
-/// drawing.
+/// Relative standard uncertainty of the torque per strain of a slender beam, from lengths and modulus of the drawing.
 fn strain_relative_std(
     section: &Section,
     shape: &BeamShape,
@@ -161,7 +160,7 @@ fn strain_relative_std(
     Ok(derived(section, Kind::Torque, &inputs, torque)?.relative_std())
 }
 
-/// An estimate that follows from others.
+/// An estimate derived from others.
 fn derived(
     section: &Section,
     kind: Kind,
@@ -169,13 +168,13 @@ fn derived(
     f: impl Fn(&[f64]) -> Result<f64, ModelError>,
 ) -> Result<Estimate, Failure> {
     let values: Vec<f64> = inputs.iter().map(|e| e.value()).collect();
-    // The model says what is wrong with the inputs themselves.
+    // The model reports errors of the inputs themselves.
     f(&values).map_err(|error| section.fail("", error))?;
     Estimate::derive(kind, "drawing", inputs, |x| f(x).unwrap_or(f64::NAN))
         .map_err(|error| section.fail("", error))
 }
 
-/// A thread: a piece of the beam with a circular section of the root diameter.
+/// A thread: a segment of the beam with a circular section of the root diameter.
 fn threaded(thread: &Section, length: f64, whole: CrossSection) -> Result<Vec<Segment>, Failure> {
     let wrong = |error| thread.fail("", error);
     let threaded_length = thread.positive("length", Kind::Length)?.value();
@@ -223,7 +222,7 @@ pub(super) fn part(section: &Section) -> Result<NamedPart, Failure> {
     Ok(NamedPart { name, inertia })
 }
 
-/// A part out of its mass in kg and its radii in m.
+/// A part from its mass in kg and its radii in m.
 fn shaped(kind: &str, x: &[f64]) -> Part {
     match kind {
         "thin-ring" => Part::ThinRing {

@@ -12,7 +12,7 @@ use super::section::Section;
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::Motion;
 
-/// Unit in which the mechanics move the record of a stand without a static gain.
+/// Unit of the record of a stand without a static gain.
 const TORQUE: &str = "N m";
 
 /// An effect that the stand file declares.
@@ -34,7 +34,8 @@ impl DeclaredEffect {
     }
 }
 
-/// What makes speed or acceleration of the displacement: `(jω)^m`; `None` where that is recorded.
+/// The derivative that gives speed or acceleration from displacement: `(jω)^m`; `None` for a
+/// displacement record.
 pub fn derivative(measures: Motion) -> Option<Link> {
     let order = measures.order();
     (order > 0).then(|| Link {
@@ -47,7 +48,7 @@ pub fn derivative(measures: Motion) -> Option<Link> {
     })
 }
 
-/// Reads one effect; its parameters are in powers of the unit that the mechanics move the record by.
+/// Parses one effect; its parameters are in powers of the record unit of the mechanics.
 pub(super) fn effect(section: &Section, recorded_unit: &str) -> Result<DeclaredEffect, Failure> {
     let names: Vec<&str> = EFFECTS.iter().map(|e| e.name).collect();
     let kind = section
@@ -59,7 +60,7 @@ pub(super) fn effect(section: &Section, recorded_unit: &str) -> Result<DeclaredE
     let form = effect
         .form(section.word("form", &forms)?)
         .ok_or_else(|| section.fail("kind", format_args!("\"{kind}\" has no form")))?;
-    // Where the value comes from is for people.
+    // The source is informative only.
     let _ = section.text("source")?;
     let read = |parameter| value(section, parameter, recorded_unit);
     let parameters: Result<Vec<_>, Failure> = form.parameters.iter().map(read).collect();
@@ -82,7 +83,7 @@ fn value(
     let unit = parameter.unit.text(recorded_unit);
     let example = || format!("{name} = \"0.01 {unit}\"").replace(" \"", "\"");
     let Some((text, std)) = section.raw_with_std(name)? else {
-        // Orders of a line that are not there have no amplitude.
+        // Missing orders of a line have zero amplitude.
         if name.starts_with("amplitude_") {
             return Ok((0.0, None));
         }
@@ -125,7 +126,7 @@ fn value(
 }
 
 impl Stand {
-    /// Unit of what the stand's mechanics move the record by: that of the static gain, or torque.
+    /// Record unit of the stand's mechanics: that of the static gain, or torque.
     #[must_use]
     pub fn recorded_unit(&self) -> &str {
         self.static_gain()
@@ -140,7 +141,7 @@ impl Stand {
         Ok(self.mechanics()?.response.modal())
     }
 
-    /// Recorded per applied quantity at rest, in SI units; 1 for a stand that records torque.
+    /// Static gain, recorded per applied quantity, in SI units; 1 for a stand that records torque.
     #[must_use]
     pub fn gain(&self) -> f64 {
         self.static_gain().map_or(1.0, |gain| gain.value)
@@ -164,7 +165,8 @@ impl Stand {
             .with_links(self.effects.iter().map(DeclaredEffect::link)))
     }
 
-    /// Torques push the gage by its own parts of the modes, which residues of both signs do not tell.
+    /// Torques act on the gage with their own modal contributions, which cannot be inferred from
+    /// residues of mixed signs.
     fn refuse_unknown_shapes(&self, modes: &ModalResponse) -> Result<(), Failure> {
         let torque = self.effects.iter().find(|e| e.form.stage == Stage::Stand);
         match (torque, modes.at_gage()) {
@@ -182,10 +184,10 @@ impl Stand {
         }
     }
 
-    /// What a compensation multiplies by: the inverse response of the chain.
+    /// The factor of a compensation: the inverse response of the chain.
     ///
     /// # Errors
-    /// If the stand file gives no mechanics, or an effect that no division takes out.
+    /// If the stand file gives no mechanics, or an effect that cannot be divided out.
     pub fn inverse(&self) -> Result<Inverse, Failure> {
         let plain = self.mechanics()?.response.clone();
         let chain = self.chain()?;

@@ -1,4 +1,4 @@
-//! Reading a stand file.
+//! Parsing of a stand file.
 
 use std::path::Path;
 
@@ -24,8 +24,8 @@ const SCHEMA: &str = "torqcomp.stand/1";
 /// Reads a stand file.
 ///
 /// # Errors
-/// If it cannot be read, is no TOML, or holds a key or value that does not belong there; the
-/// message names the line.
+/// If it cannot be read, is not TOML, or contains an invalid key or value; the message names the
+/// line.
 pub fn read(path: &Path) -> Result<Stand, Failure> {
     let (name, text) = text(path)?;
     parse(&name, &text)
@@ -42,10 +42,10 @@ pub fn text(path: &Path) -> Result<(String, String), Failure> {
     }
 }
 
-/// Reads a stand from text; `name` stands in messages.
+/// Parses a stand from text; `name` is used in messages.
 ///
 /// # Errors
-/// As [`read`].
+/// As for [`read`].
 pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
     let source = SourceText { name, text };
     let document = Document::parse(text).map_err(|error| {
@@ -90,7 +90,7 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
     Ok(stand)
 }
 
-/// A section that may be there once.
+/// An optional section.
 fn one<T>(
     top: &Section,
     key: &'static str,
@@ -113,7 +113,7 @@ fn check_schema(top: &Section) -> Result<(), Failure> {
     }
 }
 
-/// What can hardly be meant.
+/// Implausible settings.
 fn oddities(stand: &Stand) -> Vec<Warning> {
     let modes = stand.mechanics.iter().flat_map(Mechanics::damping_ratios);
     let overdamped = modes.filter(|ratio| *ratio > 1.0).map(|ratio| {
@@ -162,7 +162,7 @@ fn left_unexplained(stand: &Stand) -> Option<Warning> {
     ))
 }
 
-/// A warning if a low-pass is taken for an RC one.
+/// A warning if the order of a low-pass was assumed to be 1 (RC).
 fn assumed_order(stand: &Stand) -> Option<Warning> {
     stand.recorder.is_order_assumed.then(|| {
         Warning::new(
@@ -176,7 +176,7 @@ fn assumed_order(stand: &Stand) -> Option<Warning> {
     })
 }
 
-/// What would convert the record twice, or give its zero twice.
+/// Rejects settings that would convert the record twice, or give its zero twice.
 fn one_calibration(top: &Section, stand: &Stand) -> Result<(), Failure> {
     if stand.static_gain().is_some() && stand.calibration.is_some() {
         return Err(top.fail(
@@ -207,7 +207,7 @@ fn one_calibration(top: &Section, stand: &Stand) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What a diagnosis wrote about itself; what is not used is for people.
+/// Entries written by a diagnosis; unused ones are informative only.
 fn diagnosed(section: &Section) -> Result<Diagnosed, Failure> {
     for key in ["applied_unit", "records"] {
         let _ = section.text(key)?;

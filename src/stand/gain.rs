@@ -1,4 +1,4 @@
-//! What is to be known of the gain between bridge and record.
+//! Warnings about the gain between bridge and record.
 
 use super::{Stand, TransducerSignal};
 use crate::warning::Warning;
@@ -17,7 +17,7 @@ impl Stand {
         })
     }
 
-    /// A warning if a gain is given that a calibration of recorded volts does not need, and that nothing else uses.
+    /// A warning if a gain is given but unused, as a calibration of recorded volts does not need it.
     pub(super) fn unused_gain(&self, signal: TransducerSignal) -> Option<Warning> {
         let gain = self.recorder.recorder.gain();
         let is_unused = signal == TransducerSignal::Voltage && self.gage.is_none() && gain != 1.0;

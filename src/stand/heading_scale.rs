@@ -1,9 +1,10 @@
-//! Scales that the heading of a channel names.
+//! Scale factors in the heading of a channel.
 
 use crate::unit::{NamedUnit, inside_brackets};
 use crate::warning::Warning;
 
-/// A warning if the heading of a channel names a scale, as `x10`, `*1000`, `× 0.1`, `(x100)`, `/10`, `0.1 x` or `[0.1 N m]`.
+/// A warning if the heading of a channel contains a scale factor, as in `x10`, `*1000`, `× 0.1`, `(x100)`, `/10`,
+/// `0.1 x` or `[0.1 N m]`.
 pub(super) fn unapplied(heading: &str) -> Option<Warning> {
     let scale = scaled_unit(heading).or_else(|| scale_in(heading))?;
     Some(Warning::new(
@@ -24,7 +25,7 @@ fn scaled_unit(heading: &str) -> Option<String> {
     is_scale.then(|| inside.to_owned())
 }
 
-/// A power of ten beside a mark of multiplication or division.
+/// A power of ten next to a multiplication or division sign.
 fn scale_in(heading: &str) -> Option<String> {
     let is_mark = |c: char| matches!(c, 'x' | 'X' | '×' | '·' | '*' | '/');
     let is_power = |number: &str| {
@@ -43,7 +44,7 @@ fn scale_in(heading: &str) -> Option<String> {
         let mut marks = word.char_indices().filter(|(_, c)| is_mark(*c));
         let is_beside = marks.any(|(at, mark)| {
             let (left, right) = (&word[..at], &word[at + mark.len_utf8()..]);
-            // That of `Torque*100` stands between words; that of `box10` or of the topic `motor/10` is part of one.
+            // In `Torque*100` the sign is between words; in `box10` or the topic `motor/10` it is part of one.
             let is_between = !matches!(mark, 'x' | 'X' | '/');
             (is_power(right) && (is_between || left.is_empty()))
                 || (is_power(left) && (is_between || right.is_empty()))

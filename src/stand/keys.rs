@@ -1,9 +1,9 @@
-//! Every key of a stand file: what it takes and what it means. [`Section`](super::section::Section) reads no other,
-//! and `docs/stand-keys.md` is written from this list.
+//! Every key of a stand file, with its type and meaning. [`Section`](super::section::Section) accepts no other, and
+//! `docs/stand-keys.md` is generated from this list.
 
 use torqcomp_model::Kind;
 
-/// What a key takes.
+/// Type of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Takes {
     /// A text.
@@ -20,13 +20,13 @@ pub(crate) enum Takes {
     Section,
 }
 
-/// A key, what it takes, and what it means.
+/// A key, its type, and its meaning.
 pub(crate) type StandKey = (&'static str, Takes, &'static str);
 
-/// A section as it is written (empty for the top of the file), what it means, and its keys.
+/// A section as written (empty for the top level of the file), its meaning, and its keys.
 pub(crate) type StandSection = (&'static str, &'static str, &'static [StandKey]);
 
-/// What a key of a section takes.
+/// Type of a key in a section.
 pub(crate) fn takes(title: &str, name: &str) -> Option<Takes> {
     let (_, _, keys) = SECTIONS.iter().find(|section| section.0 == title)?;
     let (_, takes, _) = keys.iter().find(|key| key.0 == name)?;
@@ -36,7 +36,7 @@ pub(crate) fn takes(title: &str, name: &str) -> Option<Takes> {
 /// A conversion to the value of a key.
 type Convert = fn(f64) -> f64;
 
-/// Keys that are known by other names, and their value from those of that name.
+/// Keys also known by other names, with the conversion from those.
 const OTHER_TERMS: [(&str, &[&str], Convert); 3] = [
     ("damping_ratio", &["Q", "quality_factor", "quality"], |q| {
         0.5 / q
@@ -49,7 +49,7 @@ const OTHER_TERMS: [(&str, &[&str], Convert); 3] = [
     ("damping_ratio", &["loss_factor"], |eta| 0.5 * eta),
 ];
 
-/// How the value of a key follows from what stands under another name.
+/// Conversion to a key from a value under another name.
 pub(super) fn from_other_term(key: &str, name: &str) -> Option<Convert> {
     let is_it = |(of, names, _): &&(&str, &[&str], Convert)| {
         *of == key && names.iter().any(|known| known.eq_ignore_ascii_case(name))
@@ -62,7 +62,7 @@ pub(super) fn from_other_term(key: &str, name: &str) -> Option<Convert> {
 
 use Takes::{Quantity, RecordQuantity, Section, Text, Whole, Word};
 
-/// All sections, in the order in which a stand file usually has them.
+/// All sections, in the usual order of a stand file.
 #[rustfmt::skip]
 pub(crate) const SECTIONS: &[StandSection] = &[
     ("", "What the file is, and its sections.", &[

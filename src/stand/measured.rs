@@ -1,4 +1,4 @@
-//! Reading `[calibration]`: what certificates and data sheets say.
+//! Parsing of `[calibration]`: data of certificates and data sheets.
 
 use nalgebra::DMatrix;
 use torqcomp_dsp::curve::CalibrationCurve;
@@ -13,19 +13,19 @@ use crate::failure::Failure;
 /// A measured calibration: torque over a signal.
 #[derive(Debug, Clone)]
 pub struct MeasuredCalibration {
-    /// What becomes torque.
+    /// The calibrated signal.
     pub signal: TransducerSignal,
-    /// How.
+    /// The calibration law.
     pub law: CalibrationLaw,
-    /// TransducerSignal at no load, in SI units, where the calibration itself gives it.
+    /// Signal at no load, in SI units, if given by the calibration itself.
     pub zero: Option<Estimate>,
-    /// Relative standard uncertainty of the torque, if known; of a curve that at its largest torque.
+    /// Relative standard uncertainty of the torque, if known; for a curve at its largest torque.
     pub relative_std: Option<f64>,
-    /// Rated torque of the transducer in N m, without sign, if it is given.
+    /// Magnitude of the transducer's rated torque in N m, if given.
     pub rated_n_m: Option<f64>,
 }
 
-/// How a signal becomes torque.
+/// Conversion of a signal to torque.
 #[derive(Debug, Clone)]
 pub enum CalibrationLaw {
     /// Torque per signal, in SI units.
@@ -35,7 +35,7 @@ pub enum CalibrationLaw {
 }
 
 impl MeasuredCalibration {
-    /// The constant, if it is one of volts.
+    /// The constant, if it is for volts.
     #[must_use]
     pub fn torque_per_volt(&self) -> Option<&Estimate> {
         match &self.law {
@@ -46,7 +46,7 @@ impl MeasuredCalibration {
         }
     }
 
-    /// The change of the signal from no load to rated torque in SI units, without sign, if both are known.
+    /// Magnitude of the signal change from no load to rated torque in SI units, if both are known.
     #[must_use]
     pub fn change_at_rated(&self) -> Option<(TransducerSignal, f64)> {
         let CalibrationLaw::Constant(constant) = &self.law else {
@@ -56,7 +56,7 @@ impl MeasuredCalibration {
         Some((self.signal, change))
     }
 
-    /// The calibration in words.
+    /// The calibration as text.
     #[must_use]
     pub fn described(&self, units: UnitSystem) -> String {
         match &self.law {
@@ -81,7 +81,7 @@ impl MeasuredCalibration {
     }
 }
 
-/// Keys that each begin another form.
+/// Keys that each start another form.
 const FORMS: [&str; 6] = [
     "torque_per_volt",
     "torque_per_ratio",
@@ -121,12 +121,12 @@ pub(super) fn calibration(section: &Section) -> Result<MeasuredCalibration, Fail
     Ok(read)
 }
 
-/// What to write where the section holds none of the forms.
+/// Advice if the section contains none of the forms.
 const HOW: &str = "write one of torque_per_volt = \"12.5 N m/V\"; torque_per_ratio = \"25 N m/(mV/V)\"; sensitivity = \
     \"2.0012 mV/V\" with rated_torque = \"50 N m\"; zero_frequency = \"60 kHz\", frequency_at_rated = \"90 kHz\" and \
     rated_torque = \"50 N m\"; lever_arm = \"0.5 m\"; points = [{ reading = \"1 mV/V\", torque = \"25 N m\" }, …]";
 
-/// Refuses the keys that the form does not take; the message lists those of all forms.
+/// Rejects keys that the form does not accept; the message lists those of all forms.
 fn finish(section: &Section) -> Result<(), Failure> {
     if section.finish().is_ok() {
         return Ok(());
@@ -173,7 +173,7 @@ fn constant(
     })
 }
 
-/// `rated_torque` beside a form that does not need it: what the transducer is made for.
+/// Optional `rated_torque` of a form that does not need it.
 fn optional_rated(section: &Section) -> Result<Option<f64>, Failure> {
     let rated = section.quantity("rated_torque", Kind::Torque)?;
     match rated.map(|rated| rated.value().abs()) {
@@ -182,7 +182,7 @@ fn optional_rated(section: &Section) -> Result<Option<f64>, Failure> {
     }
 }
 
-/// `sensitivity` at `rated_torque`, as data sheets say: the change of the output from no load to the rated torque.
+/// `sensitivity` at `rated_torque`, as in data sheets: change of the output from no load to the rated torque.
 fn sensitivity(section: &Section) -> Result<MeasuredCalibration, Failure> {
     let read = TransducerSignal::read(section, "sensitivity")?;
     let (signal, change) =
@@ -249,7 +249,7 @@ struct CalibrationPoint {
     torque: Estimate,
 }
 
-/// `points`, joined by straight lines or by a polynomial of `degree`.
+/// `points`, interpolated linearly or fitted by a polynomial of `degree`.
 fn points(section: &Section) -> Result<MeasuredCalibration, Failure> {
     let table = section.sections("points").map_err(|_| {
         section.fail(
@@ -303,7 +303,7 @@ fn points(section: &Section) -> Result<MeasuredCalibration, Failure> {
     })
 }
 
-/// One point, and what its reading is of.
+/// One point, and the signal of its reading.
 fn point(row: &Section) -> Result<(TransducerSignal, CalibrationPoint), Failure> {
     let expected = "expected reading = \"1.0003 mV/V\", torque = \"25 N m\"";
     let read = TransducerSignal::read(row, "reading")?;
@@ -318,8 +318,8 @@ fn point(row: &Section) -> Result<(TransducerSignal, CalibrationPoint), Failure>
     Ok((signal, CalibrationPoint { reading, torque }))
 }
 
-/// The polynomial through points by least squares, weighted where every point has a `std`, and the relative standard
-/// uncertainty of the torque that it gives at the largest reading.
+/// Least-squares polynomial through points, weighted if every point has a `std`, and the relative standard
+/// uncertainty of its torque at the largest reading.
 fn polynomial(
     points: &[CalibrationPoint],
     degree: usize,

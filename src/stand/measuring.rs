@@ -1,4 +1,4 @@
-//! Reading what measures: the gage, the bridge, the recorder.
+//! Parsing of the measuring chain: gage, bridge, recorder.
 
 use torqcomp_dsp::bridge::{BridgeLayout, Leads, Supply};
 use torqcomp_dsp::gage::Gage;
@@ -12,13 +12,13 @@ use crate::failure::Failure;
 use crate::print::short;
 use crate::warning::Warning;
 
-/// Smallest gain that an amplifier has; below, another quantity is meant.
+/// Smallest plausible gain of an amplifier; a smaller value is another quantity.
 const LEAST_GAIN: f64 = 0.01;
 
-/// Sizes of gage factors: of metal foil (2, platinum up to 6), and of semiconductors.
+/// Typical magnitudes of gage factors: metal foil (2, platinum up to 6), and semiconductors.
 const GAGE_FACTORS: [std::ops::RangeInclusive<f64>; 2] = [1.0..=6.5, 30.0..=190.0];
 
-/// A warning about a gage factor that no usual gage has.
+/// A warning about an unusual gage factor.
 pub(super) fn unusual_gage_factor(gage: &GageData) -> Option<Warning> {
     let factor = gage.gage.gage_factor();
     let is_usual = GAGE_FACTORS
@@ -38,7 +38,7 @@ pub(super) fn unusual_gage_factor(gage: &GageData) -> Option<Warning> {
 
 pub(super) fn gage(section: &Section) -> Result<GageData, Failure> {
     let optional = |key, kind| section.quantity(key, kind).map(|e| e.map(|e| e.value()));
-    // A metal-foil gage is linear, and temperature does not enter its law.
+    // A metal-foil gage is linear, and its law does not depend on temperature.
     let room = 298.15;
     let reference = optional("reference_temperature", Kind::TemperatureAbsolute)?.unwrap_or(room);
     let temperature_k = optional("temperature", Kind::TemperatureAbsolute)?.unwrap_or(reference);
@@ -206,7 +206,7 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
     })
 }
 
-/// The amplifier's gain, below zero if it inverts.
+/// Gain of the amplifier, negative if it inverts.
 fn gain(section: &Section) -> Result<Option<Estimate>, Failure> {
     let given = section.quantity("gain", Kind::Gain)?;
     match &given {

@@ -11,10 +11,10 @@ use crate::identify::Motion;
 use crate::print::short;
 use crate::warning::Warning;
 
-/// Part of the response at rest that is hardly meant to be left to modes above the band.
+/// Implausibly large contribution of modes above the band to the static response.
 const MUCH: f64 = 0.5;
 
-/// The mechanics, if there are any.
+/// The mechanics, if given.
 pub(super) fn mechanics(top: &Section) -> Result<Option<Mechanics>, Failure> {
     let section = top.section("mechanics")?;
     let modes = declared_modes(&top.sections("modes")?)?;
@@ -25,7 +25,7 @@ pub(super) fn mechanics(top: &Section) -> Result<Option<Mechanics>, Failure> {
     }
 }
 
-/// `[[modes]]`, with what `[mechanics]` says beside them.
+/// `[[modes]]`, with the related keys of `[mechanics]`.
 fn several_modes(
     top: &Section,
     section: Option<&Section>,
@@ -55,7 +55,7 @@ fn several_modes(
     })
 }
 
-/// What the record is of: the displacement, or a derivative of it.
+/// The recorded quantity: the displacement, or a derivative of it.
 fn measures(section: &Section) -> Result<Motion, Failure> {
     let words = Motion::ALL.map(Motion::name);
     let word = section.word("measures", &words)?;
@@ -77,7 +77,7 @@ impl Mechanics {
         }
     }
 
-    /// A warning if residues leave so much of 1 that they are hardly parts of it.
+    /// A warning if the residues leave an implausibly large remainder to 1.
     pub(super) fn much_left(&self, file: &str) -> Option<Warning> {
         let StandResponse::Modes(modes) = &self.response else {
             return None;
@@ -123,7 +123,8 @@ fn one_mode(section: &Section) -> Result<Mechanics, Failure> {
         let own = |estimate: &Estimate| own_std(section, estimate, common);
         let response = SecondOrder::new(inertia.value(), damping.value(), stiffness.value())
             .map_err(|error| section.fail("", error))?;
-        // So that the message about an unknown key lists those of both forms.
+        // Marks these keys as read, so that the message about an unknown key lists those of both
+        // forms.
         let _ = MODAL.map(|key| section.raw(key));
         Mechanics {
             response: StandResponse::Constants(response),
@@ -147,7 +148,7 @@ fn one_mode(section: &Section) -> Result<Mechanics, Failure> {
     Ok(mechanics)
 }
 
-/// Relative standard uncertainty that inertia, damping and stiffness share, since two of them follow from the third.
+/// Relative standard uncertainty common to inertia, damping and stiffness, as two of them follow from the third.
 fn common_std(section: &Section) -> Result<f64, Failure> {
     let Some(common) = section.quantity("common_std", Kind::Ratio)? else {
         return Ok(0.0);
@@ -167,11 +168,11 @@ fn correlations(section: &Section) -> Result<[f64; 3], Failure> {
     Ok(found)
 }
 
-/// Largest part by which the common uncertainty may exceed the whole one: both are rounded.
+/// Relative amount by which the common uncertainty may exceed the total one, as both are rounded.
 const ROUNDED: f64 = 1e-6;
 
-/// What is left of a standard uncertainty without the common part, which cancels in every ratio of the constants: the
-/// stand's response follows from these alone.
+/// Standard uncertainty without the common part, which cancels in every ratio of the constants, and so in the stand's
+/// response.
 fn own_std(section: &Section, estimate: &Estimate, common: f64) -> Result<Option<f64>, Failure> {
     let Some(std) = estimate.std_uncertainty() else {
         return Ok(None);
@@ -186,7 +187,7 @@ fn own_std(section: &Section, estimate: &Estimate, common: f64) -> Result<Option
     Ok(Some((std * std - shared * shared).max(0.0).sqrt()))
 }
 
-/// Asks for a natural frequency in 1/s, which is one in Hz to some and an angular one to others.
+/// Rejects a natural frequency in 1/s, which may mean Hz or an angular frequency.
 pub(super) fn refuse_bare_rate(section: &Section) -> Result<(), Failure> {
     let Some(text) = section.raw("natural_frequency")? else {
         return Ok(());

@@ -1,4 +1,4 @@
-//! The stand as the stand file describes it.
+//! The stand as described by the stand file.
 
 mod calibration;
 mod drawing;
@@ -40,20 +40,20 @@ pub use signal::TransducerSignal;
 pub use uncertainty::{ConstantStd, TorqueStd};
 pub(crate) use uncertainty::{VariedConstant, combined};
 
-/// A stand: its mechanics, and how its record becomes torque.
+/// A stand: its mechanics, and the conversion of its record to torque.
 #[derive(Debug, Clone)]
 pub struct Stand {
     /// Name of the stand.
     pub name: String,
-    /// File it was read from.
+    /// Source file.
     pub file: String,
     /// Inertia, damping and stiffness.
     pub mechanics: Option<Mechanics>,
-    /// Measured torque over the recorded signal.
+    /// Measured calibration, torque over the recorded signal.
     pub calibration: Option<MeasuredCalibration>,
-    /// The beam's drawing.
+    /// Drawing of the beam.
     pub beam: Option<BeamDrawing>,
-    /// Parts that make up the inertia.
+    /// Parts that contribute to the inertia.
     pub parts: Vec<NamedPart>,
     /// Friction against speed.
     pub friction: Option<Friction>,
@@ -63,43 +63,43 @@ pub struct Stand {
     pub bridge: Option<BridgeData>,
     /// The recorder.
     pub recorder: RecorderData,
-    /// What the plain stand lacks.
+    /// Declared effects, which the plain stand lacks.
     pub effects: Vec<DeclaredEffect>,
-    /// What a diagnosis wrote about itself.
+    /// Entries written by a diagnosis.
     pub diagnosed: Diagnosed,
-    /// What is odd about the file.
+    /// Warnings about the file.
     pub warnings: Vec<Warning>,
 }
 
-/// What a diagnosis wrote about the records that it refined the stand with.
+/// Entries written by a diagnosis about the records that it used.
 #[derive(Debug, Clone, Default)]
 pub struct Diagnosed {
     /// Unit of the record.
     pub measured_unit: Option<String>,
-    /// How the diagnosis ended.
+    /// Verdict of the diagnosis.
     pub verdict: Option<String>,
-    /// Constant in the record, in SI units.
+    /// Offset of the record, in SI units.
     pub offset: f64,
-    /// Displacement by a constant load, in SI units of the record.
+    /// Displacement under a constant load, in SI units of the record.
     pub shift: f64,
 }
 
 /// The stand's response, from measured constants.
 #[derive(Debug, Clone)]
 pub struct Mechanics {
-    /// The response, its static gain being 1.
+    /// The response, with a static gain of 1.
     pub response: StandResponse,
-    /// Uncertainties of its constants, if it is given by them.
+    /// Uncertainties of its constants, if it is given by constants.
     pub std: ParameterStd,
-    /// Record per applied quantity at rest, if it is not a torque stand.
+    /// Static gain, record per applied quantity, if it is not a torque stand.
     pub static_gain: Option<StaticGain>,
-    /// What is recorded: the displacement (or the torque of the beam), or a derivative of it.
+    /// The recorded quantity: the displacement (or the torque of the beam), or a derivative of it.
     pub measures: Motion,
-    /// How it was given.
+    /// Form in which it was given.
     pub given: Given,
 }
 
-/// How the mechanics were given.
+/// Form in which the mechanics were given.
 #[derive(Debug, Clone)]
 pub enum Given {
     /// As inertia, damping and stiffness.
@@ -122,7 +122,7 @@ pub enum Given {
     Modes(Vec<DeclaredMode>),
 }
 
-/// The linear response of a stand as its file gives it.
+/// Linear response of a stand in the form of its file.
 #[derive(Debug, Clone)]
 pub enum StandResponse {
     /// By the constants of its one mode.
@@ -132,7 +132,7 @@ pub enum StandResponse {
 }
 
 impl StandResponse {
-    /// Applied over recorded quantity, relative to that at rest.
+    /// Applied over recorded quantity, normalised to its static value.
     pub(crate) fn inverse(&self, frequency_hz: f64) -> Complex64 {
         match self {
             Self::Constants(constants) => constants.inverse(frequency_hz),
@@ -152,7 +152,7 @@ impl StandResponse {
     }
 }
 
-/// Recorded quantity per applied quantity at zero frequency, in any units.
+/// Static gain, recorded per applied quantity, in any units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StaticGain {
     /// The number in SI units.
@@ -165,12 +165,12 @@ pub struct StaticGain {
     pub relative_std: Option<f64>,
 }
 
-/// The beam and where the gage sits on it.
+/// The beam and the position of the gage on it.
 #[derive(Debug, Clone)]
 pub struct BeamDrawing {
-    /// Angular stiffness as a slender beam, of one section, in a rigid clamp.
+    /// Angular stiffness as a slender beam of one section in a rigid clamp.
     pub slender_stiffness: Estimate,
-    /// The beam with all that the drawing gives: shear, clamp, threads.
+    /// The beam with all details of the drawing: shear, clamp, threads.
     pub full: torqcomp_model::Beam,
     /// Elastic modulus.
     pub modulus: Estimate,
@@ -185,13 +185,13 @@ pub struct BeamDrawing {
 /// A part with its name.
 #[derive(Debug, Clone)]
 pub struct NamedPart {
-    /// What it is.
+    /// Name of the part.
     pub name: String,
     /// Its mass moment of inertia about the shaft.
     pub inertia: Estimate,
 }
 
-/// A friction force that rises with speed, at a radius.
+/// A friction force proportional to speed, at a radius.
 #[derive(Debug, Clone)]
 pub struct Friction {
     /// Rise of the friction force.
@@ -222,13 +222,13 @@ pub struct GageData {
 /// A bridge.
 #[derive(Debug, Clone)]
 pub struct BridgeData {
-    /// Which arms are gages, if it is given.
+    /// Arrangement of the gages, if given.
     pub layout: Option<BridgeLayout>,
-    /// What drives it, if it is given.
+    /// Supply, if given.
     pub supply: Option<Supply>,
     /// Relative standard uncertainty of the supply, if known.
     pub supply_relative_std: Option<f64>,
-    /// Its wires.
+    /// Wiring.
     pub leads: Leads,
 }
 
@@ -245,18 +245,18 @@ pub struct RecorderData {
     pub delay_std_s: Option<f64>,
     /// Whether the file gives the gain.
     pub has_gain: bool,
-    /// Whether the order of the low-pass is not in the file.
+    /// Whether the order of the low-pass is assumed, not given in the file.
     pub is_order_assumed: bool,
     /// Relative standard uncertainty of the gain, if known.
     pub gain_relative_std: Option<f64>,
     /// Input resistance in Ω that loads the bridge.
     pub input_resistance_ohm: Option<f64>,
-    /// Record at no load in SI units, if it is given.
+    /// Record at no load in SI units, if given.
     pub zero: Option<(TransducerSignal, Estimate)>,
 }
 
 impl Stand {
-    /// The mechanics, or what to write to have them.
+    /// The mechanics, or a failure that says what to write.
     ///
     /// # Errors
     /// If the stand file gives none.

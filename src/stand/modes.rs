@@ -9,7 +9,8 @@ use super::section::Section;
 use crate::failure::Failure;
 use crate::identify::MODE_NUMBERS;
 
-/// Keys of the correlation coefficients of a mode's numbers, and the places of both in its list of keys.
+/// Keys of the correlation coefficients of a mode's numbers, and the indices of both numbers in its list
+/// of keys.
 pub const MODE_CORRELATIONS: [(&str, [usize; 2]); 6] = [
     ("correlation_frequency_damping", [0, 1]),
     ("correlation_frequency_residue", [0, 2]),
@@ -19,7 +20,7 @@ pub const MODE_CORRELATIONS: [(&str, [usize; 2]); 6] = [
     ("correlation_residue_quadrature", [2, 3]),
 ];
 
-/// A mode as the stand file gives it.
+/// A mode as given in the stand file.
 #[derive(Debug, Clone)]
 pub struct DeclaredMode {
     /// Those of [`MODE_NUMBERS`], the frequency in Hz.
@@ -27,21 +28,21 @@ pub struct DeclaredMode {
     stds: [Option<f64>; 4],
     /// In the order of [`MODE_CORRELATIONS`].
     correlations: [f64; 6],
-    /// Its part in what a torque at the gage moves the gage by, if that is known.
+    /// Its contribution to the displacement of the gage by a torque at the gage, if known.
     at_gage: Option<f64>,
-    /// Whether its parts follow from its shape at load and gage.
+    /// Whether its contributions follow from its mode shape at load and gage.
     has_shape: bool,
 }
 
-/// A mode as it is read, before its part of the whole is known.
+/// A mode as read, before its contribution is normalised.
 struct ReadMode<'a> {
     section: &'a Section<'a>,
     mode: DeclaredMode,
-    /// Its shape at the load and at the gage, in place of a residue.
+    /// Its mode shape at the load and at the gage, instead of a residue.
     shape: Option<[Estimate; 2]>,
 }
 
-/// Reads all modes.
+/// Parses all modes.
 pub(super) fn declared_modes(sections: &[Section]) -> Result<Vec<DeclaredMode>, Failure> {
     let mut read: Vec<ReadMode> = sections
         .iter()
@@ -63,7 +64,8 @@ pub(super) fn declared_modes(sections: &[Section]) -> Result<Vec<DeclaredMode>, 
     Ok(read.into_iter().map(|read| read.mode).collect())
 }
 
-/// `r_k = φ_k(load) φ_k(gage)/ω_k²` and `g_k = φ_k(gage)²/ω_k²`, each over the sum over all modes.
+/// `r_k = φ_k(load) φ_k(gage)/ω_k²` and `g_k = φ_k(gage)²/ω_k²`, normalised by their sums over all
+/// modes.
 fn by_shapes(read: &mut [ReadMode]) -> Result<(), Failure> {
     let mut parts = Vec::new();
     for mode in &*read {
@@ -97,7 +99,7 @@ fn by_shapes(read: &mut [ReadMode]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Where no residue is negative, load and gage count as one place; a gage elsewhere needs shapes.
+/// If no residue is negative, load and gage count as one place; a gage elsewhere needs mode shapes.
 fn by_residues(read: &mut [ReadMode]) {
     let sum: f64 = read.iter().map(|mode| mode.mode.values[2]).sum();
     if sum > 0.0 && read.iter().all(|mode| mode.mode.values[2] >= 0.0) {
@@ -122,7 +124,7 @@ impl<'a> ReadMode<'a> {
         for ((key, _), value) in MODE_CORRELATIONS.into_iter().zip(&mut correlations) {
             *value = section.correlation(key)?;
         }
-        // Where the numbers come from is for people.
+        // The source is informative only.
         let _ = section.text("source")?;
         section.finish()?;
         let shape = match (residue.is_some(), shape) {
@@ -164,18 +166,18 @@ impl<'a> ReadMode<'a> {
     }
 }
 
-/// What a mode is asked for that has a frequency and damping only.
+/// Message for a mode with frequency and damping only.
 const NO_RESIDUE: &str = "residue is missing: the part that this mode has in the response at rest, as in residue = 0.9; a decay does \
                           not tell it: measure it by identify response with a known torque or force, or give shape_at_load and \
                           shape_at_gage of all modes";
 
 impl DeclaredMode {
-    /// The mode, and the place of one of its numbers, for a place among the numbers of all modes.
+    /// The mode and the index within it of a number, from its index among the numbers of all modes.
     pub(super) fn place(of_all: usize) -> (usize, usize) {
         (of_all / MODE_NUMBERS.len(), of_all % MODE_NUMBERS.len())
     }
 
-    /// Its part of the response.
+    /// Its contribution to the response.
     pub(super) fn part(&self) -> ModalPart {
         let [frequency_hz, damping_ratio, residue, quadrature] = self.values;
         ModalPart {
@@ -189,7 +191,7 @@ impl DeclaredMode {
         }
     }
 
-    /// Whether its parts in the response follow from its shape at load and gage.
+    /// Whether its contributions follow from its mode shape at load and gage.
     pub fn has_shape(&self) -> bool {
         self.has_shape
     }
@@ -206,7 +208,7 @@ impl DeclaredMode {
         found.map(|(_, value)| value).sum()
     }
 
-    /// The same with one number moved by so many of its standard uncertainties.
+    /// The same with one number changed by a multiple of its standard uncertainty.
     pub(super) fn moved(&self, number: usize, by: f64) -> Option<Self> {
         let mut moved = self.clone();
         moved.values[number] += by * self.stds[number]?;
@@ -223,7 +225,7 @@ mod tests {
         parse("s.toml", &text).map_err(|failure| failure.to_string())
     }
 
-    /// A mode at 100 Hz and one at 200 Hz, with more lines.
+    /// A mode at 100 Hz and one at 200 Hz, with additional lines.
     fn two(first: &str, second: &str) -> String {
         let mode = |hz, more| {
             format!("[[modes]]\nnatural_frequency = \"{hz} Hz\"\ndamping_ratio = 0.01\n{more}\n")
@@ -236,12 +238,12 @@ mod tests {
         let stand = read(&two("residue = 0.9", "residue = 0.06")).unwrap();
         let modes = stand.modes().unwrap();
         assert!((modes.residual() - 0.04).abs() < 1e-15);
-        // Load and gage in one place: 0.9 of 0.96.
+        // Load and gage in the same place: 0.9 of 0.96.
         assert!((modes.parts()[0].at_gage.unwrap() - 0.9375).abs() < 1e-15);
         assert!(stand.warnings.is_empty());
     }
 
-    /// φ φ/f²: 2·1/1 and −2·2/4 are 2 and −1, of 1; at the gage 1/1 and 4/4.
+    /// φ φ/f²: 2·1/1 and −2·2/4 are 2 and −1, normalised by 1; at the gage 1/1 and 4/4.
     #[test]
     fn shapes_give_residues_and_what_a_torque_at_the_gage_does() {
         let text = two(

@@ -1,14 +1,14 @@
-//! What the rated torque of a transducer says against a record.
+//! Plausibility of a record against the rated torque of a transducer.
 
 use crate::print::{rounded, short};
 use crate::warning::Warning;
 
-/// Part of the rated torque from which a torque is doubtful: it is about what transducers stand without damage.
+/// Torque relative to the rated one above which it is doubtful: about the safe overload of transducers.
 const FAR_BEYOND: f64 = 1.5;
-/// Part of the rated torque below which a torque is doubtful: it is about the error of a transducer of class 0.5.
+/// Torque relative to the rated one below which it is doubtful: about the error of a class 0.5 transducer.
 const FAR_BELOW: f64 = 5e-3;
 
-/// A warning if a torque lies far beyond what the transducer is rated for, or far below, both in a unit.
+/// A warning if a torque is far above or below the rated one, both in the same unit.
 pub fn off_rated(largest: f64, rated: Option<f64>, unit: &str) -> Option<Warning> {
     let rated = rated?;
     if largest > 0.0 && largest < FAR_BELOW * rated {

@@ -1,4 +1,4 @@
-//! Writing what a diagnosis found into a stand file.
+//! Writing the results of a diagnosis to a stand file.
 
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, value};
 
@@ -10,38 +10,38 @@ use crate::failure::{ErrorCode, Failure};
 use crate::io::digits;
 use crate::print::unit_of_quotient;
 
-/// A parameter of an effect as it is written: name, text of its value, and of its standard uncertainty.
+/// A parameter of an effect as written: name, value, and standard uncertainty.
 pub type WrittenParameter<'a> = (&'a str, String, Option<String>);
-/// An effect as it is written: kind, form, parameters.
+/// An effect as written: kind, form, parameters.
 pub type Written<'a> = (&'a str, &'a str, Vec<WrittenParameter<'a>>);
 
-/// What a diagnosis found.
+/// Results of a diagnosis.
 pub struct Refined<'a> {
     /// Natural frequency in Hz, and its standard uncertainty.
     pub natural_hz: (f64, Option<f64>),
     /// Damping ratio, and its standard uncertainty.
     pub damping_ratio: (f64, Option<f64>),
-    /// Of a stand with several modes what was fitted of each, by the keys of its table.
+    /// Fitted numbers of each mode of a stand with several, by the keys of its table.
     pub modes: Vec<Vec<(&'static str, Estimate)>>,
-    /// Recorded per applied quantity at rest, in SI units, where it was found, and its standard uncertainty.
+    /// Static gain, recorded per applied quantity, in SI units, if found, and its standard uncertainty.
     pub gain: Option<(f64, Option<f64>)>,
     /// Units of record and applied quantity in SI.
     pub units: (&'a str, &'a str),
-    /// Unit of the record as its file gives it.
+    /// Unit of the record as given in its file.
     pub measured_unit: &'a str,
-    /// Constant in the records, and displacement by a constant load, in SI units of the record.
+    /// Offset of the records, and displacement under a constant load, in SI units of the record.
     pub constants: [f64; 2],
-    /// Effects: kind, form, parameters with their texts.
+    /// Effects: kind, form, parameters as text.
     pub effects: Vec<Written<'a>>,
-    /// Where the numbers come from.
+    /// Origin of the numbers.
     pub source: String,
-    /// How the diagnosis ended.
+    /// Verdict of the diagnosis.
     pub verdict: &'a str,
 }
 
 impl Refined<'_> {
-    /// Inertia `K/ω₀²` and damping `2ζK/ω₀` beside a declared stiffness, each with the standard uncertainty that this and
-    /// the fit give it.
+    /// Inertia `K/ω₀²` and damping `2ζK/ω₀` for a declared stiffness, with standard uncertainties from the stiffness
+    /// and the fit.
     fn beside(&self, stiffness: &Estimate) -> [(f64, Option<f64>); 2] {
         let relative = |(value, std): (f64, Option<f64>)| std.map(|std| std / value);
         let omega = std::f64::consts::TAU * self.natural_hz.0;
@@ -79,7 +79,7 @@ impl Refined<'_> {
         if let Some(Given::Constants { stiffness, .. }) = given
             && self.gain.is_none()
         {
-            // Torque against torque determines ratios only: the stiffness stays as declared.
+            // Torque over torque determines only ratios, so the stiffness stays as declared.
             let [inertia, damping] = self.beside(stiffness);
             mechanics["inertia"] = self.quantity(inertia, "kg m^2");
             mechanics["damping"] = self.quantity(damping, "N m s/rad");
@@ -119,7 +119,7 @@ impl Refined<'_> {
         self.write_modes(document);
     }
 
-    /// Puts what was fitted of each mode into its table.
+    /// Writes the fitted numbers of each mode to its table.
     fn write_modes(&self, document: &mut DocumentMut) {
         let tables = document
             .get_mut(MODES)
@@ -164,11 +164,11 @@ impl Refined<'_> {
     }
 }
 
-/// The text of a stand file with the refined constants and the effects: the declared one, changed where it was
-/// refined, or a new one.
+/// The text of a stand file with the refined constants and the effects: the declared one with changes, or a
+/// new one.
 ///
 /// # Errors
-/// If the declared text cannot be read again.
+/// If the declared text cannot be parsed again.
 pub fn refine(declared: Option<(&Stand, &str)>, refined: &Refined) -> Result<String, Failure> {
     let text = declared.map_or(
         "schema = \"torqcomp.stand/1\"\nname = \"refined stand\"\n",
@@ -188,7 +188,7 @@ pub fn refine(declared: Option<(&Stand, &str)>, refined: &Refined) -> Result<Str
     Ok(document.to_string())
 }
 
-/// The SI unit of the same dimension as a unit, in text; empty for none.
+/// The SI unit of the same dimension, as text; empty if none.
 #[must_use]
 pub fn si_unit(text: &str) -> String {
     use torqcomp_model::{Kind, Unit, UnitSystem};

@@ -1,4 +1,5 @@
-//! Reading a section of a stand file: every key is asked for, and what was not asked for is wrong.
+//! Parsing of a section of a stand file: every key must be requested, and remaining ones are
+//! errors.
 
 use std::cell::RefCell;
 
@@ -42,7 +43,7 @@ pub struct Section<'a> {
 }
 
 impl<'a> Section<'a> {
-    /// A section under a title such as `[mechanics]`.
+    /// A section with a title such as `[mechanics]`.
     pub fn new(
         source: &'a SourceText<'a>,
         title: impl Into<String>,
@@ -58,8 +59,8 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// What `keys` says of a key. Tables of `value`, `std` and `source` are not listed there, nor are parameters of
-    /// effects.
+    /// Type of a key according to `keys`. Tables of `value`, `std` and `source` are not listed there, nor are
+    /// parameters of effects.
     fn listed(&self, key: &str) -> Option<Takes> {
         keys::takes(&self.title, key)
     }
@@ -74,7 +75,7 @@ impl<'a> Section<'a> {
         self.table.get(key)
     }
 
-    /// A failure at a key, or at the section if the key is not there.
+    /// A failure at a key, or at the section if the key is missing.
     pub fn fail(&self, key: &str, message: impl std::fmt::Display) -> Failure {
         let place = self
             .table
@@ -89,7 +90,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Whether a key is there.
+    /// Whether a key is present.
     pub fn has(&self, key: &str) -> bool {
         self.table.contains_key(key)
     }
@@ -187,7 +188,7 @@ impl<'a> Section<'a> {
         self.quantity_of(key, kind)
     }
 
-    /// The same of a key that takes several kinds.
+    /// The same for a key that accepts several kinds.
     pub fn quantity_of(&self, key: &'static str, kind: Kind) -> Result<Option<Estimate>, Failure> {
         let Some(item) = self.item(key) else {
             return Ok(None);
@@ -220,13 +221,13 @@ impl<'a> Section<'a> {
         self.estimate(key, kind, value, std, source).map(Some)
     }
 
-    /// A quantity that must be there.
+    /// A required quantity.
     pub fn required(&self, key: &'static str, kind: Kind) -> Result<Estimate, Failure> {
         self.quantity(key, kind)?
             .ok_or_else(|| self.missing(key, kind))
     }
 
-    /// A key that is not there; perhaps it is there misspelt.
+    /// Failure for a missing key, possibly present with a misspelt name.
     fn missing(&self, key: &str, kind: Kind) -> Failure {
         let misspelt = self
             .table
@@ -249,7 +250,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// A number under a name that is no key, and what it is as a key that is.
+    /// A number under an alternative name, converted to the key.
     fn in_other_terms(&self, key: &str) -> Option<(&'a str, f64)> {
         let as_key = |(name, item): (&'a str, &'a Item)| {
             let number = item.as_float().or(item.as_integer().map(|n| n as f64));
@@ -259,14 +260,14 @@ impl<'a> Section<'a> {
         self.table.iter().find_map(as_key)
     }
 
-    /// A quantity that must be there and greater than zero.
+    /// A required quantity greater than zero.
     pub fn positive(&self, key: &'static str, kind: Kind) -> Result<Estimate, Failure> {
         let estimate = self.required(key, kind)?;
         self.check_positive(key, kind, &estimate)?;
         Ok(estimate)
     }
 
-    /// A quantity that must be greater than zero if it is there.
+    /// An optional quantity greater than zero.
     pub fn positive_if_any(
         &self,
         key: &'static str,
@@ -293,7 +294,7 @@ impl<'a> Section<'a> {
         ))
     }
 
-    /// A quantity that must not be negative.
+    /// A required quantity that is not negative.
     pub fn not_negative(&self, key: &'static str, kind: Kind) -> Result<Estimate, Failure> {
         let estimate = self.required(key, kind)?;
         if estimate.value() >= 0.0 {
@@ -316,7 +317,7 @@ impl<'a> Section<'a> {
         Estimate::new(kind, value, std, source.to_owned()).map_err(|error| self.fail(key, error))
     }
 
-    /// The text of a quantity; a bare number is passed on so that its kind can refuse it.
+    /// The text of a quantity; a bare number is passed on so that its kind can reject it.
     fn quantity_text(&self, key: &str, item: &Item) -> Result<String, Failure> {
         if let Some(text) = item.as_str() {
             return Ok(text.to_owned());
@@ -333,7 +334,7 @@ impl<'a> Section<'a> {
         ))
     }
 
-    /// The raw text of a quantity whose unit tells its kind, out of a table of `value`, `std` and `source` as well.
+    /// The raw text of a quantity whose unit determines its kind, also from a table of `value`, `std` and `source`.
     pub fn raw(&self, key: &'static str) -> Result<Option<String>, Failure> {
         Ok(self.raw_with_std(key)?.map(|(text, _)| text))
     }
@@ -362,7 +363,7 @@ impl<'a> Section<'a> {
         Ok(Some((text, std)))
     }
 
-    /// A correlation coefficient; 0 if it is not there.
+    /// A correlation coefficient; 0 if missing.
     pub fn correlation(&self, key: &'static str) -> Result<f64, Failure> {
         let given = self.quantity(key, Kind::Ratio)?;
         let value = given.map_or(0.0, |given| given.value());
@@ -372,7 +373,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Refuses the keys that nobody asked for.
+    /// Rejects keys that were not requested.
     pub fn finish(&self) -> Result<(), Failure> {
         let asked = self.asked.borrow();
         match self.table.iter().find(|(key, _)| !asked.contains(key)) {

@@ -1,4 +1,4 @@
-//! What a recorder stores before anything is calibrated: volts, a ratio of voltages, a current, a frequency, a strain, a force.
+//! Signals of a recorder before calibration: volts, a ratio of voltages, a current, a frequency, a strain, a force.
 
 use std::f64::consts::TAU;
 
@@ -8,7 +8,7 @@ use super::section::Section;
 use crate::failure::Failure;
 use crate::print::rounded;
 
-/// The quantity that a transducer or its amplifier gives.
+/// Output quantity of a transducer or its amplifier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TransducerSignal {
     /// V.
@@ -21,12 +21,12 @@ pub enum TransducerSignal {
     Frequency,
     /// Strain, m/m.
     Strain,
-    /// N, of a load cell at a lever.
+    /// N, from a load cell at a lever.
     Force,
 }
 
 impl TransducerSignal {
-    /// All of them.
+    /// All signals.
     pub const ALL: [Self; 6] = [
         Self::Voltage,
         Self::Ratio,
@@ -36,7 +36,7 @@ impl TransducerSignal {
         Self::Force,
     ];
 
-    /// What a record in that unit is; `None` for torque, plain ratios and all else.
+    /// Signal with this unit; `None` for torque, plain ratios and anything else.
     #[must_use]
     pub fn of(unit: &Unit) -> Option<Self> {
         const VOLTAGE: Dimension = Dimension::new([1, 2, -3, -1, 0, 0]);
@@ -53,7 +53,7 @@ impl TransducerSignal {
         }
     }
 
-    /// Largest magnitude in SI units that such a signal has, and why; `None` where nothing limits it.
+    /// Largest magnitude of such a signal in SI units, and the reason; `None` if unlimited.
     #[must_use]
     pub fn largest(self) -> Option<(f64, &'static str)> {
         match self {
@@ -69,7 +69,7 @@ impl TransducerSignal {
         }
     }
 
-    /// The kind of its quantities.
+    /// Kind of the quantity.
     #[must_use]
     pub fn kind(self) -> Kind {
         match self {
@@ -92,7 +92,7 @@ impl TransducerSignal {
         }
     }
 
-    /// The unit that people give it in, and SI units per that unit.
+    /// Customary unit, and SI units per that unit.
     #[must_use]
     pub fn usual_unit(self) -> (&'static str, f64) {
         match self {
@@ -105,8 +105,8 @@ impl TransducerSignal {
         }
     }
 
-    /// Why a change of the output from no load to rated torque cannot be right beside an output at no load, if it would leave what
-    /// such outputs reach; both in SI units.
+    /// Why a change of the output from no load to rated torque contradicts an output at no load, if it would exceed the
+    /// range of such outputs; both in SI units.
     #[must_use]
     pub fn beyond_loop(self, change: f64, zero: f64) -> Option<String> {
         let (name, largest) = match self {
@@ -141,17 +141,17 @@ impl TransducerSignal {
         )
     }
 
-    /// A value in SI units with its usual unit, for people and stand files.
+    /// A value in SI units as text in the customary unit.
     #[must_use]
     pub fn text(self, value: f64) -> String {
         let (unit, factor) = self.usual_unit();
         format!("{} {unit}", crate::io::digits::text(value / factor, 9))
     }
 
-    /// A quantity of a stand file whose unit says which signal it is of.
+    /// A quantity of a stand file whose unit determines its signal.
     ///
     /// # Errors
-    /// If it cannot be read, or its unit is that of none.
+    /// If it cannot be read, or its unit is not that of a signal.
     pub(super) fn read(
         section: &Section,
         key: &'static str,
@@ -174,7 +174,7 @@ impl TransducerSignal {
     }
 }
 
-/// Why a text is no signal.
+/// Message for a text that is not a signal.
 fn unknown(text: &str, unit: &Unit) -> String {
     match unit.ratio_of() {
         Some(_) => format!(

@@ -1,4 +1,5 @@
-//! From a transducer's or a bridge's signal to torque: by the measured calibration, or by beam, gage and bridge.
+//! Conversion of a transducer's or bridge's signal to torque: by the measured calibration, or by beam, gage and
+//! bridge.
 
 use torqcomp_dsp::bridge::{ArmLaw, Bridge, Supply};
 use torqcomp_dsp::conversion::{Conversion, ConversionError};
@@ -9,18 +10,18 @@ use crate::failure::{ErrorCode, Failure};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
-/// From a record in SI units to torque in N m, at rest.
+/// Static conversion from a record in SI units to torque in N m.
 pub(super) struct StaticLaw {
     pub(super) conversion: Conversion,
-    /// How it came about, for people.
+    /// Origin of the conversion, as text.
     pub(super) described: String,
-    /// Of the static constant.
+    /// Uncertainty of the static constant.
     pub(super) std: ConstantStd,
-    /// What was assumed on the way.
+    /// Assumptions made.
     pub(super) warnings: Vec<Warning>,
 }
 
-/// Relative standard uncertainty of a product whose factors have these.
+/// Relative standard uncertainty of a product from those of its factors.
 pub(super) fn together(stds: &[Option<f64>]) -> Option<f64> {
     let known = stds.iter().copied().flatten();
     known.reduce(f64::hypot)
@@ -38,7 +39,8 @@ impl StaticLaw {
 }
 
 impl Stand {
-    /// From the signal of a transducer or bridge to torque: by the measured calibration, or else by the drawing.
+    /// Conversion of the signal of a transducer or bridge to torque: by the measured calibration, otherwise by
+    /// the drawing.
     pub(super) fn by_signal(
         &self,
         signal: TransducerSignal,
@@ -89,7 +91,7 @@ impl Stand {
         ))
     }
 
-    /// The record at no load, if it is given for such a signal.
+    /// The record at no load, if given for such a signal.
     fn zero_of(&self, signal: TransducerSignal) -> Result<Option<f64>, Failure> {
         use TransducerSignal::{Ratio, Voltage};
         let given = self.recorder.zero.as_ref();
@@ -115,7 +117,7 @@ impl Stand {
         }
     }
 
-    /// SI units of a signal per SI unit of another one; `None` where none is the other one in another form.
+    /// SI units of a signal per SI unit of another one; `None` if they are not two forms of the same.
     fn per_signal(
         &self,
         recorded: TransducerSignal,
@@ -131,7 +133,7 @@ impl Stand {
         })
     }
 
-    /// The bridge's supply in V.
+    /// Supply voltage of the bridge in V.
     fn excitation_v(&self) -> Result<f64, Failure> {
         match self.bridge.as_ref().and_then(|bridge| bridge.supply) {
             Some(Supply::ConstantVoltage { volts }) => Ok(volts),
@@ -144,7 +146,7 @@ impl Stand {
         }
     }
 
-    /// By a measured constant or curve; `scale` is of its signal per recorded one.
+    /// By a measured constant or curve; `scale` converts the recorded signal to the calibrated one.
     fn by_measured(
         &self,
         measured: &MeasuredCalibration,
@@ -170,7 +172,7 @@ impl Stand {
                 Conversion::linear(slope, -slope * zero)
             }
             CalibrationLaw::Curve(curve) => {
-                // A zero of today moves the curve.
+                // A present zero shifts the curve.
                 let shift = match zero {
                     Some(zero) => {
                         curve
@@ -228,19 +230,19 @@ impl Stand {
         self.bridge.as_ref()?.supply_relative_std
     }
 
-    /// Torque per signal about no load by the drawing, in SI units, with its relative standard uncertainty; `None` if the
-    /// drawing does not give it.
+    /// Torque per signal about no load from the drawing, in SI units, with its relative standard uncertainty; `None` if
+    /// the drawing is insufficient.
     pub(crate) fn drawn_slope(&self, signal: TransducerSignal) -> Option<(f64, Option<f64>)> {
         let law = self.by_drawing(signal, 0.0, UnitSystem::Si).ok()?;
         Some((law.conversion.small_signal_gain(), law.std.known()))
     }
 
-    /// Torque per signal about no load by the calibration, in SI units, with its relative standard uncertainty; volts and
-    /// ratios become each other through gain and supply. `None` if it is of another signal.
+    /// Torque per signal about no load from the calibration, in SI units, with its relative standard uncertainty; volts
+    /// and ratios are converted by gain and supply. `None` if it is for another signal.
     pub(crate) fn measured_slope(&self, signal: TransducerSignal) -> Option<(f64, Option<f64>)> {
         let measured = self.calibration.as_ref()?;
         let scale = self.per_signal(signal, measured.signal).ok()??;
-        // The zero does not change the slope.
+        // The zero does not affect the slope.
         let law = self
             .by_measured(measured, signal, scale, Some(0.0), UnitSystem::Si)
             .ok()?;
@@ -337,7 +339,7 @@ impl Stand {
         }
     }
 
-    /// Relative standard uncertainty of the torque by beam, gage and bridge.
+    /// Relative standard uncertainty of the torque from beam, gage and bridge.
     fn of_drawing(&self, signal: TransducerSignal) -> Option<f64> {
         let of_beam = self.beam.as_ref().and_then(|b| b.strain_relative_std);
         let of_gage = self.gage.as_ref().and_then(|g| g.factor_relative_std);
@@ -350,7 +352,7 @@ impl Stand {
         }
     }
 
-    /// The voltage that a recorded ratio refers to: any, if the supply is one of voltage.
+    /// The reference voltage of a recorded ratio; arbitrary for a voltage supply.
     fn ratio_excitation_v(&self) -> Result<f64, Failure> {
         match self.bridge.as_ref().and_then(|bridge| bridge.supply) {
             None => Ok(1.0),
@@ -367,12 +369,12 @@ impl Stand {
     /// The bridge with its gage, leads and load.
     ///
     /// # Errors
-    /// If the stand file does not give the gage and the bridge, or they do not fit.
+    /// If the stand file does not give the gage and the bridge, or they are incompatible.
     pub fn bridge(&self) -> Result<Bridge, Failure> {
         self.bridge_fed_by(None)
     }
 
-    /// The same with another supply than that of the file.
+    /// The same with a supply other than that of the file.
     fn bridge_fed_by(&self, supply: Option<Supply>) -> Result<Bridge, Failure> {
         let (Some(gage), Some(bridge)) = (&self.gage, &self.bridge) else {
             return Err(Failure::failed(
@@ -420,7 +422,7 @@ impl Stand {
     /// Torque per strain at the gage, in N m.
     ///
     /// # Errors
-    /// If the stand file does not say where the gage sits on the beam.
+    /// If the stand file does not give the position of the gage on the beam.
     pub fn torque_per_strain(&self) -> Result<f64, Failure> {
         let beam = self.beam.as_ref();
         let placed = beam.and_then(|b| b.gage_position.as_ref().map(|p| (b, p)));

@@ -1,4 +1,4 @@
-//! Standard uncertainty of what a compensation multiplies by, from all constants of the stand file.
+//! Standard uncertainty of the factor of a compensation, from all constants of the stand file.
 
 use std::f64::consts::TAU;
 
@@ -8,26 +8,26 @@ use torqcomp_model::{InverseUncertainty, ModalResponse, ParameterStd, SecondOrde
 use super::{DeclaredMode, Given, Mechanics, Stand, StandResponse};
 use crate::identify::MODE_NUMBERS;
 
-/// Relative standard uncertainty of the constant that makes torque of a record at rest.
+/// Relative standard uncertainty of the static constant from record to torque.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum ConstantStd {
     /// The record is the applied quantity; no constant is needed.
     NotNeeded,
-    /// A constant is used, and nothing says how well it is known.
+    /// A constant is used, but its uncertainty is unknown.
     #[default]
     Unknown,
-    /// It is known that well.
+    /// Known value.
     Relative(f64),
 }
 
 impl ConstantStd {
-    /// Of a constant whose relative standard uncertainty is given or not.
+    /// From an optional relative standard uncertainty.
     #[must_use]
     pub fn of(relative: Option<f64>) -> Self {
         relative.map_or(Self::Unknown, Self::Relative)
     }
 
-    /// The number, if one is known.
+    /// The value, if known.
     #[must_use]
     pub fn known(self) -> Option<f64> {
         match self {
@@ -37,19 +37,19 @@ impl ConstantStd {
     }
 }
 
-/// What is known of the standard uncertainty of a compensated torque at one frequency.
+/// Standard uncertainty of a compensated torque at one frequency, as far as known.
 #[derive(Debug, Clone, Default)]
 pub struct TorqueStd {
     /// Of the response that is divided out; `None` if unknown.
     pub response: Option<InverseUncertainty>,
-    /// Of response and static constant together; `None` if one of them is unknown.
+    /// Of response and static constant combined; `None` if one of them is unknown.
     pub total: Option<InverseUncertainty>,
 }
 
 impl Stand {
-    /// Standard uncertainty of a compensated torque at a frequency: of the response, and with that of the constant which
-    /// makes torque of the record at rest. Constants without a `std` count as exact beside others that have one. An
-    /// uncertainty of exactly zero is none that anybody knows: it is `None`.
+    /// Standard uncertainty of a compensated torque at a frequency: of the response alone, and combined with that of
+    /// the static constant. Constants without a `std` count as exact if others have one. An uncertainty of exactly zero
+    /// is treated as unknown, i.e. `None`.
     #[must_use]
     pub fn torque_std(&self, frequency_hz: f64, constant: ConstantStd) -> TorqueStd {
         let is_known =
@@ -73,9 +73,9 @@ impl Stand {
         }
     }
 
-    /// Standard uncertainty of the inverse response at a frequency: of inertia, damping and stiffness with their
-    /// correlations, of the effects' parameters, and of the recorder's low-pass and delay. Constants without a `std`
-    /// count as exact. `None` if no uncertainty is known, or if an effect that is no response over frequency has one.
+    /// Standard uncertainty of the inverse response at a frequency: from inertia, damping and stiffness with their
+    /// correlations, the effects' parameters, and the recorder's low-pass and delay. Constants without a `std` count
+    /// as exact. `None` if no uncertainty is known, or if an effect without a frequency response has one.
     #[must_use]
     pub fn inverse_uncertainty(&self, frequency_hz: f64) -> Option<InverseUncertainty> {
         let of_stand = match self.effects.is_empty() && self.constants().is_some() {
@@ -99,7 +99,7 @@ impl Stand {
         found.ok().flatten()
     }
 
-    /// Inertia, damping and stiffness, if the response is given by them.
+    /// Inertia, damping and stiffness, if the response is given by constants.
     fn constants(&self) -> Option<(&SecondOrder, &ParameterStd)> {
         let mechanics = self.mechanics.as_ref()?;
         match &mechanics.response {
@@ -108,8 +108,8 @@ impl Stand {
         }
     }
 
-    /// By the slopes over each parameter, from central differences; `None` if the stand with its effects has
-    /// no inverse response.
+    /// From the derivatives with respect to each parameter, by central differences; `None` if the stand with
+    /// its effects has no inverse response.
     fn of_mechanics_and_effects(&self, frequency_hz: f64) -> Option<Option<InverseUncertainty>> {
         let varied = self.varied();
         if self.inverse().is_err() {
@@ -145,7 +145,8 @@ impl Stand {
         all
     }
 
-    /// The stand with one constant moved by so many of its standard uncertainties; `None` if that is no stand.
+    /// The stand with one constant changed by a multiple of its standard uncertainty; `None` if the result is
+    /// invalid.
     pub(crate) fn moved(&self, constant: VariedConstant, by: f64) -> Option<Self> {
         let mut stand = self.clone();
         match constant {
@@ -160,7 +161,7 @@ impl Stand {
         Some(stand)
     }
 
-    /// Correlation coefficients of the errors of such constants.
+    /// Correlation coefficients between the errors of constants.
     pub(crate) fn correlations(&self, of: &[VariedConstant]) -> Vec<Vec<f64>> {
         let one = |a: &VariedConstant, b: &VariedConstant| match (a, b) {
             _ if a == b => 1.0,
@@ -206,13 +207,14 @@ impl Stand {
 /// A constant of the stand file that has a standard uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum VariedConstant {
-    /// Inertia, damping or stiffness, from 0; of several modes the numbers of each, one after the other.
+    /// Inertia, damping or stiffness, from 0; for several modes the numbers of each, one after the
+    /// other.
     OfMechanics(usize),
-    /// An effect's parameter: the effect's place, and its own.
+    /// An effect's parameter: the index of the effect, and that of the parameter.
     OfEffect(usize, usize),
 }
 
-/// Standard uncertainty of a sum whose terms have these ones, with their signs, and these correlations.
+/// Standard uncertainty of a sum from the signed uncertainties of its terms and their correlations.
 pub(crate) fn combined(correlations: &[Vec<f64>], terms: &[f64]) -> f64 {
     let row = |(i, row): (usize, &Vec<f64>)| {
         let mixed: f64 = row.iter().zip(terms).map(|(c, term)| c * term).sum();
@@ -266,7 +268,8 @@ impl Mechanics {
         }
     }
 
-    /// The mechanics with one constant moved by its standard uncertainty; `None` if it has none, or if no stand has that value.
+    /// The mechanics with one constant changed by its standard uncertainty; `None` if it has none, or if the result is
+    /// invalid.
     fn moved(&self, place: usize, side: f64) -> Option<Self> {
         let of = match (&self.response, &self.given) {
             (StandResponse::Constants(of), _) => of,
@@ -289,7 +292,7 @@ impl Mechanics {
 }
 
 impl Mechanics {
-    /// The mechanics with one number of their modes moved.
+    /// The mechanics with one number of their modes changed.
     fn with_modes(&self, modes: &[DeclaredMode], place: usize, side: f64) -> Option<Self> {
         let (mode, number) = DeclaredMode::place(place);
         let mut modes = modes.to_vec();
@@ -303,10 +306,12 @@ impl Mechanics {
     }
 }
 
-/// Part of a standard uncertainty over which a slope is taken: far above rounding, far below where the response bends.
+/// Fraction of a standard uncertainty used as finite-difference step: far above rounding, far below significant
+/// nonlinearity.
 const STEP: f64 = 1e-3;
 
-/// Change of the logarithm of the inverse response for one standard uncertainty of a parameter, by its slope.
+/// Change of the logarithm of the inverse response for one standard uncertainty of a parameter, by
+/// linearisation.
 fn change(with: &dyn Fn(f64) -> Option<Stand>, frequency_hz: f64) -> Option<Complex64> {
     let at = |side: f64| Some(with(side * STEP)?.inverse().ok()?(frequency_hz));
     let half = (at(1.0)? / at(-1.0)?).ln() / (2.0 * STEP);

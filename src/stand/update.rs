@@ -1,4 +1,4 @@
-//! Writing what was found into a stand file, leaving the rest of it as it is.
+//! Writing results to a stand file, preserving the rest of it.
 
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
 use torqcomp_dsp::sort_by_number;
@@ -13,12 +13,12 @@ pub struct Entry {
     pub section: &'static str,
     /// Its key, such as `stiffness`.
     pub key: &'static str,
-    /// What is written.
+    /// Its value.
     content: Value,
 }
 
 impl Entry {
-    /// A quantity with its standard uncertainty, and where it comes from.
+    /// A quantity with its standard uncertainty and its source.
     #[must_use]
     pub fn quantity(
         section: &'static str,
@@ -29,7 +29,7 @@ impl Entry {
         Self::with_source(section, key, estimate, Some(source))
     }
 
-    /// The same where the section says where its numbers come from.
+    /// The same if the section gives the source of its numbers.
     #[must_use]
     pub fn measured(section: &'static str, key: &'static str, estimate: &Estimate) -> Self {
         Self::with_source(section, key, estimate, None)
@@ -59,7 +59,7 @@ impl Entry {
         }
     }
 
-    /// A bare number, to three digits.
+    /// A bare number with three digits.
     #[must_use]
     pub fn number(section: &'static str, key: &'static str, number: f64) -> Self {
         Self::text(section, key, &crate::io::digits::text(number, 3))
@@ -131,9 +131,9 @@ impl Entry {
 const SCHEMA: &str = "torqcomp.stand/1";
 /// Keys of `[mechanics]` that exclude each other.
 pub const CONSTANTS: [&str; 3] = ["inertia", "damping", "stiffness"];
-/// Relative standard uncertainty that these three share.
+/// Relative standard uncertainty common to these three.
 pub const COMMON: &str = "common_std";
-/// Correlation coefficients of these three, in pairs.
+/// Correlation coefficients of pairs of these three.
 pub const CORRELATIONS: [&str; 3] = [
     "correlation_inertia_damping",
     "correlation_inertia_stiffness",
@@ -141,16 +141,16 @@ pub const CORRELATIONS: [&str; 3] = [
 ];
 /// Section of several modes.
 pub const MODES: &str = "modes";
-/// Keys of a mode that a decay does not tell.
+/// Keys of a mode not identifiable from a decay.
 const SHARES: [&str; 4] = ["residue", "quadrature", "shape_at_load", "shape_at_gage"];
 /// Keys that exclude those in turn.
 pub const MODAL: [&str; 2] = ["natural_frequency", "damping_ratio"];
 
-/// The text of a stand file with the entries put in; `existing` is its text so far, if there is one.
-/// Comments, order and all other entries stay.
+/// The text of a stand file with the entries inserted; `existing` is its present text, if any.
+/// Comments, order and all other entries are preserved.
 ///
 /// # Errors
-/// If the existing text is no stand file, or describes the mechanics in the other way.
+/// If the existing text is not a stand file, or describes the mechanics in the other form.
 pub fn update(name: &str, existing: Option<&str>, entries: &[Entry]) -> Result<String, Failure> {
     let mut document = match existing {
         Some(text) => text.parse::<DocumentMut>().map_err(|error| {
@@ -200,7 +200,7 @@ pub fn update(name: &str, existing: Option<&str>, entries: &[Entry]) -> Result<S
     Ok(document.to_string())
 }
 
-/// Takes out a calibration in another form, which would stand beside the new one.
+/// Removes a calibration in another form, which would conflict with the new one.
 fn make_room(name: &str, document: &mut DocumentMut, entries: &[Entry]) -> Result<(), Failure> {
     let is_new = |key: &str| {
         entries
@@ -241,8 +241,8 @@ fn make_room(name: &str, document: &mut DocumentMut, entries: &[Entry]) -> Resul
     Ok(())
 }
 
-/// Puts `[[modes]]` in the place of those that are there. Where the new ones are as many, and only frequency and damping of
-/// them are known, what the others have in the response stays.
+/// Replaces the existing `[[modes]]`. If there are as many new ones, with frequency and damping only, the contributions
+/// of the existing ones are kept.
 fn put_modes(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<(), Failure> {
     let mechanics = document.get("mechanics").and_then(Item::as_table_like);
     let mut single = CONSTANTS.iter().chain(&MODAL);
@@ -275,7 +275,7 @@ fn put_modes(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<()
     Ok(())
 }
 
-/// Modes of a stand file by rising frequency; none if one has none that can be read.
+/// Modes of a stand file in ascending order of frequency; empty if one of them cannot be read.
 fn by_frequency(tables: Option<&ArrayOfTables>) -> Vec<&Table> {
     let hertz = |table: &Table| {
         let item = table.get(MODAL[0])?;
@@ -348,12 +348,12 @@ fn put(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<(), Fail
     Ok(())
 }
 
-/// Nine significant digits: more than any record tells.
+/// Nine significant digits, more than any record can determine.
 fn number_text(number: f64) -> String {
     crate::io::digits::text(number, 9)
 }
 
-/// Whether the text of a stand file says how its record becomes torque.
+/// Whether a stand file defines the conversion of its record to torque.
 pub fn is_calibrated(text: &str) -> bool {
     let Ok(document) = text.parse::<DocumentMut>() else {
         return true;
@@ -362,7 +362,7 @@ pub fn is_calibrated(text: &str) -> bool {
     gain.is_some() || has_conversion(&document)
 }
 
-/// Whether a calibration or a drawing makes torque of its record.
+/// Whether a calibration or a drawing converts its record to torque.
 pub fn converts(text: &str) -> bool {
     let document = text.parse::<DocumentMut>();
     document.is_ok_and(|document| has_conversion(&document))
@@ -373,11 +373,11 @@ fn has_conversion(document: &DocumentMut) -> bool {
     sections.any(|key| document.contains_key(key))
 }
 
-/// A quantity of `[mechanics]` in SI units and its standard uncertainty, from the text of a stand file
-/// that need not be complete.
+/// A quantity of `[mechanics]` in SI units and its standard uncertainty, from the text of a possibly
+/// incomplete stand file.
 ///
 /// # Errors
-/// If it is there and cannot be read.
+/// If it is present but cannot be read.
 pub fn declared(
     name: &str,
     text: &str,

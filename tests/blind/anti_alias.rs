@@ -1,4 +1,4 @@
-//! The low-pass in front of a recorder, the same on both channels: Butterworth of second or fourth order.
+//! Anti-alias filter before a recorder, the same on both channels: Butterworth of second or fourth order.
 
 use std::f64::consts::{FRAC_PI_8, SQRT_2, TAU};
 
@@ -8,12 +8,12 @@ use super::integrate::Dense;
 /// Value and derivative of each section.
 type State = [[f64; 2]; 2];
 
-/// Sections `y'' = w² (u − y) − d w y'` in a row.
+/// Sections `y'' = w² (u − y) − d w y'` in series.
 #[derive(Debug, Clone, Copy)]
 pub struct AntiAlias {
     /// 2 or 4.
     pub order: usize,
-    /// Where 3 dB are lost.
+    /// −3 dB corner.
     pub corner_hz: f64,
 }
 
@@ -37,7 +37,7 @@ impl AntiAlias {
         rates
     }
 
-    /// One step of the classical Runge-Kutta method, with what comes in at its start, middle and end.
+    /// One step of the classical Runge–Kutta method, with the input at its start, middle and end.
     fn advance(&self, state: &mut State, h: f64, [u0, u1, u2]: [f64; 3]) {
         let moved = |by: f64, rates: &State| {
             let mut other = *state;
@@ -58,7 +58,7 @@ impl AntiAlias {
         }
     }
 
-    /// The section that is recorded.
+    /// The section whose output is recorded.
     fn last(&self) -> usize {
         self.order / 2 - 1
     }

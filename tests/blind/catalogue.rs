@@ -1,4 +1,4 @@
-//! Every variant of every effect: the definitions that the literature and the trade use.
+//! Every variant of every effect: definitions used in literature and practice.
 
 use super::draw::Draw;
 use super::plant::{Built, Plain, Scene};
@@ -9,12 +9,12 @@ pub struct Variant {
     /// Name in the contract, `none`, or `unlisted`.
     pub effect: &'static str,
     pub name: &'static str,
-    /// Of the records of an effect, how many take this definition, relative to its others.
+    /// Relative frequency of this definition among the records of the effect.
     pub share: u32,
-    /// Makes a stand with it; the size is a positive number without unit.
+    /// Builds a stand with it; the size is a positive dimensionless number.
     pub build: fn(&Scene, f64, &mut Draw) -> Built,
-    /// The smallest size worth a name (a low-pass far above the band is a delay, a clip that nothing
-    /// reaches is none), one to start from, and the largest that is physical.
+    /// The smallest meaningful size (a low-pass far above the band is a delay, a clip that nothing
+    /// reaches is no effect), a start value, and the largest physical one.
     pub sizes: (f64, f64, f64),
 }
 
@@ -38,7 +38,7 @@ fn nothing(scene: &Scene, _: f64, _: &mut Draw) -> Built {
     Built::dynamics(Plain(scene.constants), &[])
 }
 
-/// All of them.
+/// All variants.
 pub const CATALOGUE: &[Variant] = &[
     variant("none", "plain", 1, nothing, (1.0, 1.0, 1.0)),
     variant(
@@ -415,14 +415,14 @@ pub const CATALOGUE: &[Variant] = &[
     ),
 ];
 
-/// Names of all effects, each once, in the order of the catalogue.
+/// Names of all effects, without duplicates, in the order of the catalogue.
 pub fn effects() -> Vec<&'static str> {
     let mut names: Vec<&str> = CATALOGUE.iter().map(|variant| variant.effect).collect();
     names.dedup();
     names
 }
 
-/// The definition that the record of a number takes: each in turn, as often as its share.
+/// The definition for the record of a number: cyclic, in proportion to the shares.
 pub fn variant_of(effect: &str, number: usize) -> Option<&'static Variant> {
     let turn: Vec<&Variant> = CATALOGUE
         .iter()

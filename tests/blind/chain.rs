@@ -1,4 +1,5 @@
-//! Effects in the measuring chain without dynamics: gain, curves, clipping, play.
+//! Effects in the measuring chain without dynamics: gain, static characteristics, clipping,
+//! backlash.
 
 use super::draw::Draw;
 use super::integrate::Dense;
@@ -35,7 +36,7 @@ pub fn gage_cubic(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
 /// A bridge with one active arm: `y / (1 + s y/peak)`.
 pub fn gage_bridge(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let share = size.min(0.6) * draw.sign();
-    // Beyond twice the peak the curve is held, far from its pole.
+    // Beyond twice the peak the characteristic is constant, far from its pole.
     let per = share / scene.shown_peak;
     let limit = 0.8 / share.abs();
     let peak = scene.shown_peak;
@@ -56,7 +57,7 @@ pub fn clip(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     )
 }
 
-/// Clipping on both sides at limits that differ.
+/// Clipping on both sides at different limits.
 pub fn clip_uneven(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let high = scene.shown_peak * (1.0 - size);
     let low = -high * draw.between(0.85, 1.15);
@@ -88,7 +89,7 @@ pub fn saturate_knee(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     )
 }
 
-/// Hysteretic play between what the beam does and what the gage shows.
+/// Hysteretic backlash between the motion of the beam and the gage.
 pub fn play(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     let half = size * scene.shown_rms;
     let change = move |mut dense: Dense| {

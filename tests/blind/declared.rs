@@ -1,17 +1,17 @@
-//! The stand file that declares what a case was made with: the true constants and the effect with its true parameters.
+//! The stand file with the truth of a case: the true constants and the effect with its true parameters.
 
 use serde_json::Value;
 
-/// What a stand file says of an effect.
+/// An effect in the stand file.
 struct Effect {
     form: &'static str,
     lines: Vec<(&'static str, f64, &'static str)>,
     stiffness_n_m: f64,
-    /// Displacement by a constant load, in N m.
+    /// Displacement under a constant load, in N m.
     shift_n_m: f64,
 }
 
-/// A stand file with the truth in it; `None` where the case was made with a law that no form has.
+/// A stand file with the truth; `None` if the law of the case has no form.
 pub fn stand(truth: &Value) -> Option<String> {
     let constant = |key: &str| truth["true_constants"][key].as_f64();
     let inertia = constant("inertia_kg_m2")?;
@@ -174,7 +174,7 @@ fn effect(truth: &Value, stiffness: f64) -> Option<Effect> {
     }
 }
 
-/// Lines of the rotor as the record has them: its torque through the stand.
+/// Lines of the rotor in the record: its torque through the stand.
 fn rotor(truth: &Value) -> Option<[(&'static str, f64, &'static str); 3]> {
     let p = |key: &str| truth["parameters"][key].as_f64();
     let constant = |key: &str| truth["true_constants"][key].as_f64();
@@ -195,7 +195,7 @@ fn rotor(truth: &Value) -> Option<[(&'static str, f64, &'static str); 3]> {
     ])
 }
 
-/// A gap whose middle is off by a part of itself: with `r` the stiffness that is missing within, the gage shows
+/// A gap whose centre is offset by a fraction of it: with `r` the stiffness missing within, the gage shows
 /// `X − r clamp(X, −g, g) + s g (1 − r)`, `X = K θ − s g`.
 fn gap(p: &impl Fn(&str) -> Option<f64>, stiffness: f64) -> Option<Effect> {
     let half = p("half_gap_rad")? * stiffness;
@@ -238,7 +238,7 @@ fn hysteresis(p: &impl Fn(&str) -> Option<f64>, stiffness: f64, shown: bool) -> 
             lines.push(("exponent", exponent, ""));
             "exponent"
         }
-        // No form shows a hysteresis of another exponent.
+        // No form shows a hysteresis with another exponent.
         (true, false) => return None,
     };
     Some(Effect {

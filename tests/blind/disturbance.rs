@@ -1,4 +1,4 @@
-//! Disturbances that are added to the signal: mains, drift, the rotor.
+//! Disturbances added to the signal: mains, drift, the rotor.
 
 use std::f64::consts::TAU;
 
@@ -6,7 +6,7 @@ use super::draw::Draw;
 use super::excitation::RATE_HZ;
 use super::plant::{Built, Place, Scene};
 
-/// A sum of sines with phases drawn for each record.
+/// A sum of sines with random phases in each record.
 fn lines(scene: &Scene, lines: Vec<(f64, f64)>, parameters: &[(&'static str, f64)]) -> Built {
     let change = move |place: &mut Place, samples: &mut [f64]| {
         for (frequency_hz, amplitude) in &lines {
@@ -42,7 +42,7 @@ pub fn mains_harmonics(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
 fn hum(scene: &Scene, size: f64, shares: [f64; 3], draw: &mut Draw) -> Built {
     let written_hz = draw.one_of(&[50.0, 60.0]) + draw.between(-0.02, 0.02);
     let base_hz = written_hz * scene.span.slower;
-    // What lies above half the sampling rate does not reach a recorder.
+    // Frequencies above the Nyquist frequency do not reach a recorder.
     let reach = |order: f64, share: f64| {
         if order * base_hz < 0.45 * RATE_HZ {
             share
@@ -75,12 +75,12 @@ fn hum(scene: &Scene, size: f64, shares: [f64; 3], draw: &mut Draw) -> Built {
     )
 }
 
-/// The rotor, once a turn, as a torque on the stand.
+/// The rotor once per turn, as a torque on the stand.
 pub fn rotor(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     rotor_with(scene, size, 0.0, draw)
 }
 
-/// Once and twice a turn.
+/// Once and twice per turn.
 pub fn rotor_twice(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let second = draw.between(0.1, 0.6);
     rotor_with(scene, size, second, draw)
@@ -95,7 +95,7 @@ fn rotor_with(scene: &Scene, size: f64, second: f64, draw: &mut Draw) -> Built {
             .iter()
             .any(|mains| (f / span.slower - mains).abs() < apart_hz)
     };
-    // Four turns a record at least.
+    // At least four turns per record.
     let low_hz = (10.0 * span.faster).max(4.0 / span.length_s());
     let high_hz = (58.0 * span.faster).max(3.0 * low_hz);
     let frequency_hz = loop {
@@ -131,7 +131,7 @@ fn rotor_with(scene: &Scene, size: f64, second: f64, draw: &mut Draw) -> Built {
     )
 }
 
-/// Adds a function of the time since the record began, the same in every record.
+/// Adds a function of the time since the start of the record, the same in every record.
 fn course(
     scene: &Scene,
     course: impl Fn(f64) -> f64 + 'static,
@@ -145,13 +145,13 @@ fn course(
     Built::samples(scene, change, parameters)
 }
 
-/// Zero that runs away evenly; the zero at the start of a record is part of it.
+/// A linearly drifting zero; the zero at the start of a record is part of it.
 pub fn drift_linear(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let rate = size * scene.shown_rms * draw.sign() / scene.span.length_s();
     course(scene, move |t| rate * t, &[("n_m_per_s", rate)])
 }
 
-/// Zero that approaches another value.
+/// A zero that approaches another value exponentially.
 pub fn drift_exponential(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let range = size * scene.shown_rms * draw.sign();
     let time_s = draw.log_between(0.2, 3.0) * scene.span.longer();
@@ -162,7 +162,7 @@ pub fn drift_exponential(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     )
 }
 
-/// Zero that wanders: steps at random through two low-passes of 0.25 s, another course in each record.
+/// A wandering zero: random steps through two low-passes of 0.25 s, different in each record.
 pub fn drift_random(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     let range = size * scene.shown_rms;
     let (longer, length_s) = (scene.span.longer(), scene.span.length_s());

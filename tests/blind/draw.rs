@@ -1,4 +1,4 @@
-//! Random numbers, the same on every machine.
+//! Random numbers, reproducible on every machine.
 
 use std::f64::consts::TAU;
 
@@ -9,9 +9,9 @@ use rand::{Rng, SeedableRng};
 pub struct Draw(ChaCha8Rng);
 
 impl Draw {
-    /// The stream of a case, apart from its other streams by `purpose`.
+    /// The stream of a case, separated from its other streams by `purpose`.
     pub fn new(seed: u64, purpose: &str) -> Self {
-        // FNV-1a over the purpose: a stream of its own for whatever is drawn.
+        // FNV-1a of the purpose, for a separate stream per quantity.
         let hash = purpose
             .bytes()
             .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
@@ -23,7 +23,7 @@ impl Draw {
         Self(ChaCha8Rng::from_seed(bytes))
     }
 
-    /// Uniform between 0 and 1, neither included.
+    /// Uniform between 0 and 1, exclusive.
     pub fn unit(&mut self) -> f64 {
         ((self.0.next_u64() >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
     }
@@ -43,7 +43,7 @@ impl Draw {
         TAU * self.unit()
     }
 
-    /// True with a probability.
+    /// True with the given probability.
     pub fn chance(&mut self, probability: f64) -> bool {
         self.unit() < probability
     }

@@ -1,8 +1,8 @@
-//! The applied torque as a function of continuous time: sums of sines and sweeps, and those of [kinds](super::kinds).
+//! The applied torque as a function of continuous time: multisines and sweeps, and the other [kinds](super::kinds).
 //!
-//! Both are known in closed form with two derivatives. They are put on a grid eight times finer than
-//! the samples; between its points a polynomial of fifth degree takes values and both derivatives from
-//! the two neighbours, which is exact to 1e-10 of the amplitude at 2.4 kHz.
+//! Both are known in closed form with two derivatives. They are evaluated on a grid eight times finer than the
+//! samples; between its points a fifth-degree polynomial matches values and both derivatives at the two neighbours,
+//! which is exact to 1e-10 of the amplitude at 2.4 kHz.
 
 use std::f64::consts::TAU;
 
@@ -19,7 +19,7 @@ pub const SAMPLES: usize = 32_000;
 pub const LENGTH_S: f64 = SAMPLES as f64 / RATE_HZ;
 /// Points of the grid per sample.
 pub const FINER: usize = 8;
-/// A multisine goes on for this time after the record and fades over the second half of it.
+/// A multisine continues for this time after the record and fades over the second half of it.
 const AFTER_S: f64 = 0.25;
 
 /// One sine of a multisine.
@@ -30,7 +30,7 @@ pub struct Line {
     pub phase_rad: f64,
 }
 
-/// What is applied.
+/// The applied torque.
 #[derive(Debug, Clone)]
 pub enum Excitation {
     /// Sum of sines; the level of the second half of the record relative to the first, and whether the
@@ -48,7 +48,7 @@ pub enum Excitation {
         logarithmic: bool,
         fade_s: f64,
     },
-    /// Noise of a band.
+    /// Band-limited noise.
     Random(Random),
     /// Plateaus.
     Steps(Steps),
@@ -57,7 +57,7 @@ pub enum Excitation {
 }
 
 impl Excitation {
-    /// A multisine of flat spectrum and random phases with the given root mean square.
+    /// A multisine of flat spectrum and random phases with the given RMS.
     pub fn multisine(draw: &mut Draw, rms: f64, settled: bool) -> Self {
         let spacing_hz = draw.one_of(&[2.5, 5.0, 10.0]);
         let top_hz = draw.between(1000.0, 2200.0);
@@ -116,7 +116,7 @@ impl Excitation {
         other
     }
 
-    /// Highest frequency in it.
+    /// Its highest frequency.
     pub fn top_hz(&self) -> f64 {
         match self {
             Self::Multisine { lines, .. } => lines.last().map_or(0.0, |line| line.frequency_hz),
@@ -127,7 +127,7 @@ impl Excitation {
         }
     }
 
-    /// Its kind in a word.
+    /// Its kind, as a word.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Multisine { .. } => "multisine",
@@ -148,7 +148,7 @@ impl Excitation {
         }
     }
 
-    /// What it is, for people; frequencies and times as they are written.
+    /// Its description; frequencies and times as written in the files.
     pub fn describe(&self, span: &Span) -> String {
         // A stand of half a hertz needs more digits.
         let hz = |frequency_hz: f64| match span.slower == 1.0 {
@@ -254,7 +254,7 @@ impl Excitation {
         input
     }
 
-    /// A sweep's value and two derivatives, without its fades.
+    /// Value and two derivatives of a sweep, without its fades.
     fn sweep_at(&self, time_s: f64, length_s: f64) -> [f64; 3] {
         let Self::Sweep {
             amplitude,
@@ -291,8 +291,8 @@ impl Excitation {
     }
 }
 
-/// From one level to another around time 0, over twice the half width, with two derivatives:
-/// the polynomial 10 x³ − 15 x⁴ + 6 x⁵.
+/// Transition from one level to another around time 0, over twice the half-width, with two
+/// derivatives: the polynomial 10 x³ − 15 x⁴ + 6 x⁵.
 fn step(from: f64, to: f64, time_s: f64, half_width_s: f64) -> [f64; 3] {
     let width_s = 2.0 * half_width_s;
     let x = (time_s / width_s + 0.5).clamp(0.0, 1.0);
@@ -304,8 +304,8 @@ fn step(from: f64, to: f64, time_s: f64, half_width_s: f64) -> [f64; 3] {
     ]
 }
 
-/// Adds lines to every node, by turning phasors that are set anew every 1024 nodes. Each turn waits for the one before: eight
-/// lines go side by side.
+/// Adds lines to every node, by rotating phasors that are reset every 1024 nodes. Each rotation depends on the previous
+/// one, so eight lines are processed in parallel.
 fn add_lines(lines: &[Line], input: &mut Input) {
     let (first_s, step_s) = (input.time_s(0), input.step_s);
     for some in lines.chunks(8) {
@@ -345,15 +345,15 @@ fn add_lines(lines: &[Line], input: &mut Input) {
 /// A torque on the fine grid: value and two derivatives at each node.
 #[derive(Debug, Clone)]
 pub struct Input {
-    /// Nodes before the record begins.
+    /// Number of nodes before the record begins.
     pub before: usize,
     /// Samples of the record.
     pub samples: usize,
     /// Time between nodes.
     pub step_s: f64,
     nodes: Vec<[f64; 3]>,
-    /// Where values or derivatives jump: what each piece from a node to the next ends with. `None` if nothing jumps: then
-    /// each piece ends with what the next node has.
+    /// If values or derivatives jump: those at the end of each piece between nodes. `None` without jumps; each piece
+    /// then ends with the values of the next node.
     ends: Option<Vec<[f64; 3]>>,
 }
 
@@ -363,7 +363,7 @@ impl Input {
         (node as f64 - self.before as f64) * self.step_s
     }
 
-    /// What the piece that begins at a node ends with.
+    /// Values at the end of the piece that begins at a node.
     fn end(&self, node: usize) -> [f64; 3] {
         match &self.ends {
             Some(ends) => ends[node],
@@ -371,7 +371,7 @@ impl Input {
         }
     }
 
-    /// The same with what a filter makes of it.
+    /// The same through a filter.
     pub fn filtered(&self, filter: &AntiAlias) -> Self {
         let (nodes, ends) = filter.nodes(self, self.nodes.len() - 1);
         Self {
@@ -381,12 +381,12 @@ impl Input {
         }
     }
 
-    /// The torque at a part (0 to 1) of the way from a node to the next.
+    /// The torque at a fraction (0 to 1) of the distance between a node and the next.
     pub fn between(&self, node: usize, part: f64) -> f64 {
         let ([p0, v0, a0], [p1, v1, a1]) = (self.nodes[node], self.end(node));
         let h = self.step_s;
         let (d0, d1, c0, c1) = (h * v0, h * v1, h * h * a0 / 2.0, h * h * a1 / 2.0);
-        // Coefficients of the polynomial of fifth degree through both ends.
+        // Coefficients of the fifth-degree polynomial that matches both ends.
         let (rise, slope, curve) = (p1 - p0 - d0 - c0, d1 - d0 - 2.0 * c0, c1 - c0);
         let third = 10.0 * rise - 4.0 * slope + curve;
         let fourth = -15.0 * rise + 7.0 * slope - 2.0 * curve;
@@ -394,7 +394,7 @@ impl Input {
         p0 + part * (d0 + part * (c0 + part * (third + part * (fourth + part * fifth))))
     }
 
-    /// The torque at a node, halfway to the next, and there.
+    /// The torque at a node, halfway to the next, and at the next.
     pub fn around(&self, node: usize) -> [f64; 3] {
         let ([p0, v0, a0], [p1, v1, a1]) = (self.nodes[node], self.end(node));
         let h = self.step_s;
@@ -427,7 +427,7 @@ impl Input {
             .collect()
     }
 
-    /// Lets it end after the record and, before a record of a stand that has settled, begin, within some time.
+    /// Fades it out after the record and, before the record of a settled stand, in, within some time.
     fn fade_around(&mut self, length_s: f64, settled: bool) {
         let fade_s = AFTER_S / 4.0;
         self.shape(|time_s| step(1.0, 0.0, time_s - length_s - 3.0 * fade_s, fade_s));

@@ -1,15 +1,15 @@
-//! Effects in the friction: dry friction with sticking, its smooth form, drag with the square of speed.
+//! Friction effects: dry friction with sticking, its smooth form, drag with the square of speed.
 
 use super::draw::Draw;
 use super::integrate::{Dynamics, State};
 use super::plant::{Built, Constants, Scene, With};
 
-/// Dry friction with true sticking; `falls_by` and `over_speed` make it fall from its value at rest
+/// Dry friction with true sticking; `falls_by` and `over_speed` make it fall from its static value
 /// (Stribeck).
 struct Dry {
     constants: Constants,
     sliding_n_m: f64,
-    /// Friction at rest over that of sliding, less one.
+    /// Static over sliding friction, minus one.
     more_at_rest: f64,
     over_speed: f64,
 }
@@ -63,7 +63,7 @@ impl Dynamics for Dry {
     fn next_mode(&self, mode: i8, torque: f64, state: &mut State) -> i8 {
         state[1] = 0.0;
         if mode == 0 {
-            // The guard is at its zero to rounding: what pulls decides the direction.
+            // The guard is zero to rounding: the resultant torque decides the direction.
             self.pull(torque, state).signum() as i8
         } else {
             self.at_rest(torque, state)
@@ -83,7 +83,7 @@ pub fn coulomb(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     Built::dynamics(dry, &[("friction_n_m", sliding_n_m)])
 }
 
-/// `T_c tanh(θ̇/v)` with `v` a few per cent of the usual speed.
+/// `T_c tanh(θ̇/v)` with `v` a few per cent of the typical speed.
 pub fn coulomb_smooth(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let friction = size * scene.applied_rms;
     let speed = scene.speed_rms * draw.log_between(0.003, 0.05);
@@ -98,7 +98,7 @@ pub fn coulomb_smooth(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     )
 }
 
-/// Friction that is larger at rest, and sticks.
+/// Friction that is larger at rest, with sticking.
 pub fn stribeck(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let sliding_n_m = size * scene.applied_rms;
     let dry = Dry {
@@ -115,7 +115,7 @@ pub fn stribeck(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     Built::dynamics(dry, &parameters)
 }
 
-/// A spot that rubs: dry friction, smooth over a low speed, about one angle.
+/// A rubbing spot: dry friction, smoothed at low speed, around one angle.
 pub fn spot(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let friction = size * scene.applied_rms;
     let speed = scene.speed_rms * draw.log_between(0.01, 0.05);
@@ -137,7 +137,7 @@ pub fn spot(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     Built::dynamics(system, &parameters)
 }
 
-/// A wedge: friction in proportion to the angle.
+/// A wedge: friction proportional to the angle.
 pub fn wedge(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let coefficient = size * scene.constants.stiffness_n_m;
     let speed = scene.speed_rms * draw.log_between(0.01, 0.05);

@@ -1,9 +1,9 @@
-//! Integration in time: the classical Runge-Kutta method of fourth order at 32 steps a sample, with
+//! Time integration: the classical fourth-order Runge–Kutta method at 32 steps per sample, with
 //! switches located inside a step.
 
 use super::excitation::{FINER, Input};
 
-/// Most states that a system may have.
+/// Maximum number of states of a system.
 pub const STATES: usize = 28;
 /// States of a system; the first two are angle (rad) and speed (rad/s) of the stator.
 pub type State = [f64; STATES];
@@ -11,12 +11,13 @@ pub type State = [f64; STATES];
 const STEPS: usize = 4;
 /// Steps per sample.
 pub const DENSE: usize = STEPS * FINER;
-/// Switches within one step after which the step is taken as it is.
+/// Number of switches within one step after which the remainder is taken without locating further
+/// ones.
 const SWITCHES: usize = 12;
 
 /// A system of ordinary differential equations, smooth within each of its modes.
 pub trait Dynamics {
-    /// How many of the states are used.
+    /// Number of states used.
     fn states(&self) -> usize {
         2
     }
@@ -24,7 +25,7 @@ pub trait Dynamics {
     /// Derivatives of the states.
     fn rates(&self, mode: i8, time_s: f64, torque: f64, state: &State, rates: &mut State);
 
-    /// What the gage shows, as torque.
+    /// Torque shown by the gage.
     fn shown(&self, mode: i8, time_s: f64, torque: f64, state: &State) -> f64;
 
     /// Mode at the start.
@@ -63,7 +64,8 @@ impl Dense {
             .collect()
     }
 
-    /// The signal at any time, through the six points around it; what lies before the first is the first.
+    /// The signal at any time, interpolated through the six surrounding points; constant before the
+    /// first.
     pub fn at(&self, time_s: f64) -> f64 {
         let position = time_s / self.step_s + self.before as f64;
         let base = position.floor();
@@ -108,7 +110,7 @@ pub fn run(system: &dyn Dynamics, input: &Input) -> Dense {
     }
 }
 
-/// Where the integration stands.
+/// State of the integration.
 struct Walk<'a> {
     system: &'a dyn Dynamics,
     input: &'a Input,
@@ -117,7 +119,7 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// One step, in as many pieces as there are switches within it.
+    /// One step, divided at the switches within it.
     fn step(&mut self, node: usize, part: f64) {
         let (mut from, to) = (part, part + 1.0 / STEPS as f64);
         for _ in 0..SWITCHES {
@@ -140,7 +142,7 @@ impl Walk<'_> {
         self.system.guard(self.mode, torque, state)
     }
 
-    /// Where within the step the guard turns negative, and the state there, by bisection.
+    /// Position within the step where the guard turns negative, and the state there, by bisection.
     fn switch(&self, node: usize, from: f64, to: f64) -> (f64, State) {
         let (mut low, mut high) = (from, to);
         for _ in 0..44 {

@@ -1,4 +1,4 @@
-//! Inputs besides multisines and sweeps: random noise of a band, plateaus, single hits.
+//! Inputs besides multisines and sweeps: band-limited noise, plateaus, single hits.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,13 +10,13 @@ use super::excitation::FINER;
 /// Value and two derivatives.
 type Node = [f64; 3];
 
-/// Noise up to a frequency: lines with random amplitudes, closer than a record could tell apart.
+/// Noise up to a frequency: lines with random amplitudes, closer than a record could resolve.
 #[derive(Debug, Clone)]
 pub struct Random {
     pub rms: f64,
     pub top_hz: f64,
     pub settled: bool,
-    /// Of its lines.
+    /// Seed of its lines.
     pub seed: u64,
 }
 
@@ -31,7 +31,7 @@ impl Random {
         let mut lines: Vec<Complex64> = (0..count)
             .map(|_| Complex64::new(draw.normal(), draw.normal()))
             .collect();
-        // Half of a line's amplitude stands at each of its two frequencies.
+        // Each of the two frequencies of a line has half of its amplitude.
         let power: f64 = lines.iter().map(|line| 2.0 * line.norm_sqr()).sum();
         for line in &mut lines {
             *line *= self.rms / power.sqrt();
@@ -54,18 +54,18 @@ impl Random {
     }
 }
 
-/// Plateaus of random levels and lengths; a level holds from its sample on.
+/// Plateaus of random levels and lengths; a level applies from its sample on.
 #[derive(Debug, Clone)]
 pub struct Steps {
-    /// Samples and level of each, from before the record where the stand has settled.
+    /// Samples and level of each, starting before the record if the stand has settled.
     pub plateaus: Vec<(usize, f64)>,
     pub settled: bool,
-    /// Up to where it is taken to have a spectrum; it falls with the frequency.
+    /// Nominal upper end of its spectrum, which falls with frequency.
     pub top_hz: f64,
 }
 
 impl Steps {
-    /// Plateaus over so many samples, about so many each.
+    /// Plateaus over a number of samples, each about `each` long.
     pub fn drawn(draw: &mut Draw, rms: f64, samples: usize, each: f64) -> Vec<(usize, f64)> {
         let mut plateaus = Vec::new();
         let mut left = samples;
@@ -104,18 +104,18 @@ impl Steps {
     }
 }
 
-/// One pulse; it begins and ends at a node.
+/// A pulse that begins and ends at nodes.
 #[derive(Debug, Clone, Copy)]
 pub struct Pulse {
     pub node: usize,
     pub nodes: usize,
     pub height: f64,
-    /// `sin⁴` instead of half a sine.
+    /// `sin⁴` instead of a half-sine.
     pub smooth: bool,
 }
 
 impl Pulse {
-    /// Value and two derivatives at a part of its length.
+    /// Value and two derivatives at a fraction of its length.
     fn at(&self, part: f64, length_s: f64) -> Node {
         let (sin, cos) = (PI * part).sin_cos();
         let rate = PI / length_s;
@@ -141,7 +141,7 @@ impl Pulse {
 #[derive(Debug, Clone)]
 pub struct Hits {
     pub pulses: Vec<Pulse>,
-    /// Up to where they have a spectrum.
+    /// Upper end of their spectrum.
     pub top_hz: f64,
 }
 

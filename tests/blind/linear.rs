@@ -1,4 +1,4 @@
-//! Linear effects: modes, loss in the material, filters, delay, coupling.
+//! Linear effects: modes, material damping, filters, delay, coupling.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,13 +9,13 @@ use super::excitation::{RATE_HZ, SAMPLES};
 use super::integrate::{DENSE, Dense, Dynamics, State};
 use super::plant::{Built, Constants, Place, Plain, Scene};
 
-/// A second inertia on a spring and damper; torque acts on the first, which the gage sees.
+/// A second inertia on a spring and damper; the torque acts on the first, which the gage measures.
 struct Coupled {
     constants: Constants,
     inertia: f64,
     stiffness: f64,
     damping: f64,
-    /// Dry friction in the joint, smooth over a speed (not listed).
+    /// Dry friction in the joint, smoothed over a speed (not listed).
     joint_friction: f64,
     joint_speed: f64,
 }
@@ -41,7 +41,7 @@ impl Dynamics for Coupled {
     }
 }
 
-/// A frequency of a second mode within the band, not on top of the first.
+/// Frequency of a second mode within the band, distinct from the first.
 fn second_frequency_hz(scene: &Scene, draw: &mut Draw) -> f64 {
     let first = scene.constants.omega() / TAU;
     loop {
@@ -80,7 +80,7 @@ fn coupled(scene: &Scene, size: f64, rubbing: bool, draw: &mut Draw) -> Built {
     )
 }
 
-/// Two inertias in a row.
+/// Two inertias in series.
 pub fn second_mode_coupled(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     coupled(scene, size, false, draw)
 }
@@ -90,7 +90,8 @@ pub fn rubbing_resonance(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     coupled(scene, size, true, draw)
 }
 
-/// `y = (1 − n) K θ + r q`, `q̈ + 2 ζ ω q̇ + ω² q = ω² T`: a mode of its own that the gage sees too.
+/// `y = (1 − n) K θ + r q`, `q̈ + 2 ζ ω q̇ + ω² q = ω² T`: an additional mode that the gage also
+/// shows.
 struct Additional {
     constants: Constants,
     omega: f64,
@@ -158,8 +159,8 @@ pub fn structural_complex(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     Built::samples(scene, change, &[("loss_factor", size)])
 }
 
-/// The answer of a stand with complex stiffness. It precedes its cause, so the input must go on after the
-/// record; what the transform wraps around falls into zeros.
+/// Response of a stand with complex stiffness. It is non-causal, so the input must continue after the
+/// record; the wrap-around of the transform falls into zeros.
 fn complex_stiffness(constants: Constants, loss: f64, place: &Place) -> Vec<f64> {
     let before = place.input.before / super::excitation::FINER;
     let mut padded = place.input.all_samples();
@@ -190,8 +191,8 @@ fn complex_stiffness(constants: Constants, loss: f64, place: &Place) -> Vec<f64>
     padded[before..before + place.input.samples].to_vec()
 }
 
-/// Springs and dampers in series, log-spaced in time constant, beside the spring: a loss factor that
-/// is constant within a few per cent from 1 Hz to 10 kHz and causal.
+/// Springs and dampers in series, log-spaced in time constant, parallel to the spring: a causal loss
+/// factor that is constant within a few per cent from 1 Hz to 10 kHz.
 struct Ladder {
     constants: Constants,
     each: f64,
@@ -199,7 +200,8 @@ struct Ladder {
 }
 
 impl Ladder {
-    /// With equal stiffness `g` per branch and `n` branches a decade the loss is `g n π / (2 ln 10)`.
+    /// With equal stiffness `g` per branch and `n` branches per decade the loss is
+    /// `g n π / (2 ln 10)`.
     fn new(constants: Constants, loss: f64) -> Self {
         let per_decade = 4.0;
         let each = loss * 2.0 * std::f64::consts::LN_10 / (PI * per_decade);
@@ -241,18 +243,18 @@ pub fn structural_ladder(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     Built::dynamics(Ladder::new(scene.constants, size), &[("loss_factor", size)])
 }
 
-/// What a filter of the recorder makes of the signal.
+/// A filter of the recorder.
 #[derive(Clone, Copy)]
 enum Filter {
     /// One RC low-pass.
     Low1,
-    /// Two equal RC low-passes in a row.
+    /// Two equal RC low-passes in series.
     Low1Twice,
     /// Butterworth low-pass of second order.
     Low2,
     /// One RC high-pass (AC coupling).
     High1,
-    /// A share of the signal comes late, through one RC low-pass.
+    /// A share of the signal is delayed by one RC low-pass.
     Creep(f64),
 }
 
@@ -306,8 +308,8 @@ fn filtered(scene: &Scene, filter: Filter, corner_hz: f64) -> Built {
     Built::dynamics(system, &[("corner_hz", corner_hz)])
 }
 
-/// The corner of a low-pass of size 1: that of the thesis' stand, lower with a slower stand. With a faster one it stays
-/// where it is, below half the sampling rate.
+/// Corner of a low-pass of size 1: that of the thesis' stand, lower for a slower stand. For a faster one it stays,
+/// below the Nyquist frequency.
 fn corner_hz(scene: &Scene) -> f64 {
     600.0 * scene.span.faster.min(1.0)
 }
@@ -332,7 +334,7 @@ pub fn ac_coupling(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     filtered(scene, Filter::High1, 5.0 * size / scene.span.longer())
 }
 
-/// The gage goes on moving after the load.
+/// The gage creeps after a load.
 pub fn creep(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let corner_hz = draw.log_between(2.0, 20.0) / scene.span.longer();
     let share = size * draw.sign();
@@ -386,7 +388,7 @@ pub fn feedthrough_rc(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     Built::dynamics(leak, &parameters)
 }
 
-/// Everything comes later; size 1 is one sample.
+/// A pure delay; size 1 is one sample.
 pub fn delay(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     let delay_s = size / RATE_HZ;
     let whole = scene.filtered;
@@ -394,7 +396,7 @@ pub fn delay(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     Built::dense(scene, change, &[("delay_s", delay_s)])
 }
 
-/// The recorder's two channels have clocks of their own (not listed); size 1 is one sample in all.
+/// The recorder's two channels have separate clocks (not listed); size 1 is one sample in total.
 pub fn clock_drift(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let rate = size * draw.sign() / scene.span.samples as f64;
     let whole = scene.filtered;
@@ -402,7 +404,7 @@ pub fn clock_drift(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     Built::dense(scene, change, &[("relative_rate", rate)])
 }
 
-/// The signal read at other times; between the samples only where a filter follows.
+/// The signal at other times; between the samples only if a filter follows.
 fn stretched(dense: &Dense, whole: bool, time: impl Fn(f64) -> f64) -> Dense {
     let values = (0..dense.values.len())
         .map(|point| {

@@ -1,11 +1,10 @@
 //! Blind records: a simulated stand with one effect that its stand file does not declare.
 //!
-//! Nothing here uses torqcomp. The stand of the thesis with constants off by 2 to 20 per cent answers a
-//! multisine or a sweep over 1.6 s at 20 kHz; one effect of the [catalogue](catalogue), in one of the
-//! definitions that are in use for it, is put in (or two or three of them, see [several](several)) at a strength between marginal and plain to see; noise
-//! of 0.1 to 1 per cent of the signal is added. Inputs are known in continuous time
-//! ([excitation](excitation)), the equations of motion are integrated at 32 steps a sample with every
-//! switch located ([integrate](integrate)).
+//! Independent of torqcomp. The stand of the thesis with constants off by 2 to 20 per cent responds to a multisine or a
+//! sweep over 1.6 s at 20 kHz; one effect of the [catalogue](catalogue), in one of its common definitions, is included
+//! (or two or three of them, see [several](several)) with a strength between marginal and obvious; noise of 0.1 to 1
+//! per cent of the signal is added. Inputs are known in continuous time ([excitation](excitation)), the equations of
+//! motion are integrated at 32 steps per sample with every switch located ([integrate](integrate)).
 
 pub mod anti_alias;
 pub mod catalogue;

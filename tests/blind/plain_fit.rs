@@ -1,5 +1,5 @@
 //! The best plain fit: natural frequency, damping ratio, offset and initial state of
-//! `ÿ + 2ζω ẏ + ω² y = ω² T`, by Gauss and Newton, on a noise-free signal.
+//! `ÿ + 2ζω ẏ + ω² y = ω² T`, by Gauss–Newton, to a noise-free signal.
 
 use super::excitation::{FINER, Input, RATE_HZ};
 
@@ -10,7 +10,7 @@ pub struct PlainConstants {
     pub damping_ratio: f64,
 }
 
-/// What a plain stand makes of an input, sampled; eight steps a sample.
+/// Response of a plain stand to an input, sampled; eight steps per sample.
 pub fn answer(constants: PlainConstants, input: &Input) -> Vec<f64> {
     let (square, loss) = (
         constants.omega * constants.omega,
@@ -46,8 +46,8 @@ pub fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// What is left of a signal after offset and free decay are taken off: the columns are orthogonal
-/// enough for the normal equations.
+/// Residual of a signal without offset and free decay: the columns are orthogonal enough for the
+/// normal equations.
 fn without_nuisance(constants: PlainConstants, residual: &[f64], more: &[Vec<f64>]) -> Fit {
     let columns = nuisance(constants, residual.len())
         .into_iter()
@@ -121,7 +121,7 @@ fn solve(mut rows: Vec<Vec<f64>>) -> Vec<f64> {
     solution
 }
 
-/// The rms that plain constants leave, offset and initial state taken off.
+/// RMS residual for given constants, without offset and initial state.
 pub fn left_by(constants: PlainConstants, input: &Input, signal: &[f64]) -> f64 {
     let residual: Vec<f64> = difference(signal, &answer(constants, input));
     without_nuisance(constants, &residual, &[]).rms
@@ -131,7 +131,7 @@ fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(x, y)| x - y).collect()
 }
 
-/// The constants that leave least, and how much they leave.
+/// The constants that minimise the residual, and the residual.
 pub fn fit(start: PlainConstants, input: &Input, signal: &[f64]) -> (PlainConstants, f64) {
     let mut best = start;
     let mut best_rms = left_by(best, input, signal);

@@ -1,4 +1,4 @@
-//! The stand `J θ'' + f θ' + K θ = T` and what a variant of an effect makes of it.
+//! The stand `J θ'' + f θ' + K θ = T` with a variant of an effect.
 
 use super::draw::Draw;
 use super::excitation::Input;
@@ -17,7 +17,7 @@ pub struct Constants {
 pub const FT_LBF: f64 = 1.355_817_948_331_400_4;
 
 impl Constants {
-    /// Those of the thesis, equation (31).
+    /// The constants of the thesis, equation (31).
     pub fn hertel() -> Self {
         Self {
             inertia_kg_m2: 5.85e-3 * FT_LBF,
@@ -26,13 +26,13 @@ impl Constants {
         }
     }
 
-    /// Angular acceleration under a net torque besides spring and damper.
+    /// Angular acceleration under a net torque in addition to spring and damper.
     pub fn acceleration(&self, torque: f64, state: &State) -> f64 {
         (torque - self.damping_n_m_s * state[1] - self.stiffness_n_m * state[0])
             / self.inertia_kg_m2
     }
 
-    /// The same in seconds as they are written.
+    /// The same in seconds as written in the files.
     pub fn written(&self, span: &Span) -> Self {
         Self {
             inertia_kg_m2: self.inertia_kg_m2 * span.slower * span.slower,
@@ -46,7 +46,7 @@ impl Constants {
         (self.stiffness_n_m / self.inertia_kg_m2).sqrt()
     }
 
-    /// Part of critical damping.
+    /// Damping ratio.
     pub fn damping_ratio(&self) -> f64 {
         self.damping_n_m_s / (2.0 * (self.stiffness_n_m * self.inertia_kg_m2).sqrt())
     }
@@ -66,12 +66,12 @@ impl Dynamics for Plain {
     }
 }
 
-/// A stand with a torque that depends on angle, speed and time besides spring and damper.
+/// A stand with a torque that depends on angle, speed and time in addition to spring and damper.
 pub struct With<F> {
     pub constants: Constants,
-    /// The torque that resists, from time, angle and speed.
+    /// The resisting torque, from time, angle and speed.
     pub resists: F,
-    /// Whether the gage shows the part of it that the beam carries, too.
+    /// Whether the gage also shows the part of it carried by the beam.
     pub in_gage: bool,
 }
 
@@ -92,21 +92,21 @@ impl<F: Fn(f64, f64, f64) -> f64> Dynamics for With<F> {
     }
 }
 
-/// What is known before an effect is put in: constants and the size of what the plain stand does.
+/// The stand without the effect: constants and magnitudes of its response.
 pub struct Scene {
     pub constants: Constants,
-    /// Largest torque that the plain stand shows.
+    /// Largest torque shown by the plain stand.
     pub shown_peak: f64,
-    /// Its root mean square.
+    /// RMS torque shown by the plain stand.
     pub shown_rms: f64,
-    /// Root mean square of the speed.
+    /// RMS speed.
     pub speed_rms: f64,
-    /// Root mean square of the applied torque.
+    /// RMS applied torque.
     pub applied_rms: f64,
-    /// Highest frequency applied.
+    /// Highest applied frequency.
     pub top_hz: f64,
     pub span: Span,
-    /// Whether a filter follows, which reads the signal between the samples, too.
+    /// Whether a filter follows, which also uses the signal between the samples.
     pub filtered: bool,
 }
 
@@ -117,16 +117,16 @@ impl Scene {
     }
 }
 
-/// The record that a step of the measuring chain works on.
+/// The record processed by a step of the measuring chain.
 pub struct Place<'a> {
     pub input: &'a Input,
-    /// Numbers that differ from record to record.
+    /// Random numbers that differ between records.
     pub draw: Draw,
 }
 
-/// A change of the dense signal.
+/// An operation on the dense signal.
 pub type OnDense = Box<dyn Fn(Dense) -> Dense>;
-/// A change of the samples.
+/// An operation on the samples.
 pub type OnSamples = Box<dyn Fn(&mut Place, &mut [f64])>;
 
 /// A stand with an effect in it.
@@ -134,7 +134,7 @@ pub struct Built {
     pub dynamics: Box<dyn Dynamics>,
     pub on_dense: Option<OnDense>,
     pub on_samples: Option<OnSamples>,
-    /// What was put in, for the truth file.
+    /// The true parameters, for the truth file.
     pub parameters: Vec<(&'static str, f64)>,
 }
 
@@ -149,7 +149,7 @@ impl Built {
         }
     }
 
-    /// An effect on what the gage shows.
+    /// An effect on the gage signal.
     pub fn dense(
         scene: &Scene,
         change: impl Fn(Dense) -> Dense + 'static,
@@ -160,7 +160,7 @@ impl Built {
         built
     }
 
-    /// A static curve of the measuring chain.
+    /// A static characteristic of the measuring chain.
     pub fn curve(
         scene: &Scene,
         curve: impl Fn(f64) -> f64 + 'static,

@@ -12,7 +12,7 @@ use super::span::Span;
 use super::truth::truth;
 use super::{several, wide};
 
-/// A record: what was applied and what was measured.
+/// A record: applied and measured torque.
 pub struct Record {
     pub applied_n_m: Vec<f64>,
     pub measured_n_m: Vec<f64>,
@@ -27,7 +27,7 @@ pub struct Case {
     /// The best plain fit.
     pub plain: PlainConstants,
     pub truth: Value,
-    /// What the stand file says, if not the constants of the thesis.
+    /// The declared constants, if not those of the thesis.
     pub declared: Option<Constants>,
 }
 
@@ -41,15 +41,15 @@ fn seed_of(master: u64, effect: &str, number: usize, attempt: u64) -> u64 {
     seed
 }
 
-/// Makes a case; `None` if no list has the effect.
+/// Makes a case; `None` if the effect is in no list.
 ///
-/// Where the held-out record would hardly show the effect (a clip that its level never reaches), the case
-/// is drawn again with both records at one level.
+/// If the held-out record would hardly show the effect (a clip that its level never reaches), the case is
+/// drawn again with both records at one level.
 pub fn make(master: u64, effect: &str, number: usize) -> Option<Case> {
     make_as(&Asked::default(), master, effect, number)
 }
 
-/// Makes a case as asked for.
+/// Makes a case to specification.
 pub fn make_as(asked: &Asked, master: u64, effect: &str, number: usize) -> Option<Case> {
     let attempts = if asked.wide { 12 } else { 4 };
     let mut case = attempt(asked, master, effect, number, 0)?;
@@ -62,7 +62,7 @@ pub fn make_as(asked: &Asked, master: u64, effect: &str, number: usize) -> Optio
     Some(case.0)
 }
 
-/// Seed, definitions and setting that go together.
+/// Compatible seed, definitions and setting.
 fn drawn(
     asked: &Asked,
     master: u64,
@@ -147,7 +147,7 @@ fn attempt(
     Some((case, shows && held_strength.is_finite()))
 }
 
-/// The applied torque as it is recorded.
+/// The applied torque as recorded.
 fn applied(setting: &Setting, index: usize) -> Vec<f64> {
     let mut samples = setting.recorded(index).samples();
     if let Some(noise) = &setting.applied_noise {
@@ -157,7 +157,7 @@ fn applied(setting: &Setting, index: usize) -> Vec<f64> {
     samples
 }
 
-/// Whether the held-out input shows an effect, alone, about as well as the training input does.
+/// Whether the held-out input shows an effect alone about as well as the training input does.
 fn shows(setting: &Setting, part: &Fitted, seed: u64) -> bool {
     let held = in_setting(setting, &part.built, 1, seed);
     let left = left_by(part.plain, setting.recorded(1), &held);

@@ -1,10 +1,10 @@
-//! Effects in the restoring torque: curved springs, play, hysteresis, contacts.
+//! Effects in the restoring torque: nonlinear springs, backlash, hysteresis, contacts.
 
 use super::draw::Draw;
 use super::integrate::{Dynamics, State};
 use super::plant::{Built, Constants, Scene, With};
 
-/// `K θ (1 + s |θ/θ_peak|^(power−1))`, `s` either sign.
+/// `K θ (1 + s |θ/θ_peak|^(power−1))`, `s` of either sign.
 fn curved(scene: &Scene, s: f64, power: i32, in_gage: bool) -> Built {
     let (stiffness, peak) = (scene.constants.stiffness_n_m, scene.peak_rad());
     let coefficient = s * stiffness / peak.powi(power - 1);
@@ -22,12 +22,12 @@ fn curved(scene: &Scene, s: f64, power: i32, in_gage: bool) -> Built {
     )
 }
 
-/// Harder with the angle.
+/// Hardening with the angle.
 pub fn cubic_hardening(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     curved(scene, size, 3, false)
 }
 
-/// Softer with the angle.
+/// Softening with the angle.
 pub fn cubic_softening(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     curved(scene, -size, 3, false)
 }
@@ -37,7 +37,7 @@ pub fn cubic_in_gage(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     curved(scene, size, 3, true)
 }
 
-/// Harder to one side.
+/// Hardening to one side.
 pub fn quadratic(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     curved(scene, size * draw.sign(), 2, false)
 }
@@ -52,8 +52,8 @@ pub fn quintic(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     curved(scene, size * draw.sign(), 5, false)
 }
 
-/// Piecewise linear restoring torque: `inner` between two limits, `outer` beyond, counted from the
-/// limits, with a damper that acts beyond only.
+/// Piecewise linear restoring torque: `inner` between two limits, `outer` beyond, relative to the
+/// limits, with a damper that acts only beyond.
 struct Contact {
     constants: Constants,
     low_rad: f64,
@@ -111,12 +111,12 @@ impl Dynamics for Contact {
     }
 }
 
-/// Play between stator and beam: no restoring torque within the gap, and the gage shows none.
+/// Backlash between stator and beam: no restoring torque within the gap, and the gage shows none.
 pub fn gap(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     partial_gap(scene, size, 0.0, draw)
 }
 
-/// Within the gap a part of the stiffness is left (one of two paths has play).
+/// Part of the stiffness remains within the gap (one of two paths has backlash).
 pub fn soft_gap(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let left = draw.between(0.2, 0.6);
     partial_gap(scene, size, left, draw)
@@ -186,7 +186,7 @@ fn stop(scene: &Scene, size: f64, harder: f64, both: bool, draw: &mut Draw) -> B
     )
 }
 
-/// `ż = α θ̇ − β |θ̇| |z|^(n−1) z − γ θ̇ |z|^n` (Wen, 1976), `z` beside spring and damper.
+/// `ż = α θ̇ − β |θ̇| |z|^(n−1) z − γ θ̇ |z|^n` (Wen, 1976), `z` parallel to spring and damper.
 struct BoucWen {
     constants: Constants,
     alpha: f64,
@@ -225,10 +225,10 @@ fn bouc_wen(scene: &Scene, size: f64, exponent: f64, in_gage: bool, draw: &mut D
     let mut constants = scene.constants;
     let alpha = size * constants.stiffness_n_m;
     if in_gage {
-        // The beam's stiffness for small angles stays that of the scene.
+        // The beam's stiffness for small angles remains that of the scene.
         constants.stiffness_n_m -= alpha.min(0.9 * constants.stiffness_n_m);
     }
-    // Yield at a part of the largest torque that the hysteretic path would carry.
+    // Yield at a fraction of the largest torque that the hysteretic path would carry.
     let limit = draw.between(0.15, 0.6) * alpha * scene.peak_rad();
     let split = draw.between(0.5, 0.9);
     let per = alpha / limit.powf(exponent);
@@ -256,7 +256,7 @@ pub fn bouc_wen_1(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     bouc_wen(scene, size, 1.0, false, draw)
 }
 
-/// Another exponent, up to 2.
+/// Other exponents, up to 2.
 pub fn bouc_wen_n(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let exponent = draw.one_of(&[1.5, 2.0, 2.0]);
     bouc_wen(scene, size, exponent, false, draw)

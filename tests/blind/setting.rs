@@ -1,4 +1,4 @@
-//! What a case is drawn from: constants, excitations, noise, strength.
+//! Random setting of a case: constants, excitations, noise, strength.
 
 use super::anti_alias::AntiAlias;
 use super::draw::Draw;
@@ -7,7 +7,7 @@ use super::plain_fit::rms;
 use super::plant::Constants;
 use super::span::Span;
 
-/// What a case is drawn from.
+/// Random setting of a case.
 pub struct Setting {
     pub constants: Constants,
     pub excitations: [Excitation; 2],
@@ -15,23 +15,23 @@ pub struct Setting {
     pub noise: Noise,
     pub target: f64,
     pub span: Span,
-    /// What the stand file says, if not the constants of the thesis.
+    /// The declared constants, if not those of the thesis.
     pub declared: Option<Constants>,
-    /// The low-pass in front of the recorder, and what it makes of the inputs.
+    /// The low-pass before the recorder, and the filtered inputs.
     pub filter: Option<AntiAlias>,
     pub filtered: Option<[Input; 2]>,
     pub applied_noise: Option<AppliedNoise>,
 }
 
 impl Setting {
-    /// The applied torque as the recorder sees it, without noise.
+    /// The applied torque seen by the recorder, without noise.
     pub fn recorded(&self, record: usize) -> &Input {
         self.filtered
             .as_ref()
             .map_or(&self.inputs[record], |filtered| &filtered[record])
     }
 
-    /// Noise of an rms on the measured torque, together with what the stand makes of that on the applied one.
+    /// Noise of an RMS on the measured torque, combined with the stand's response to that on the applied one.
     pub fn whole_noise(&self, record: usize, measured_rms_n_m: f64) -> f64 {
         self.applied_noise
             .as_ref()
@@ -40,18 +40,18 @@ impl Setting {
             })
     }
 
-    /// The residual of a plain fit to a noise-free training record, over the noise.
+    /// Ratio of the residual of a plain fit to a noise-free training record to the noise.
     pub fn strength(&self, left_n_m: f64, signal: &[f64]) -> f64 {
         left_n_m / self.whole_noise(0, self.noise.share * rms(signal))
     }
 }
 
-/// What is asked for besides effect and number.
+/// Specification in addition to effect and number.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Asked {
     /// Stands, inputs and recorders of every kind instead of those of the thesis.
     pub wide: bool,
-    /// Least and largest strength.
+    /// Minimum and maximum strength.
     pub strength: Option<(f64, f64)>,
 }
 
@@ -59,24 +59,24 @@ pub struct Asked {
 pub struct AppliedNoise {
     pub share_of_rms: f64,
     pub samples: [Vec<f64>; 2],
-    /// Root mean square of what the true plain stand makes of it.
+    /// RMS response of the true plain stand to it.
     pub through_n_m: [f64; 2],
 }
 
 /// The noise of the recorder.
 #[derive(Debug, Clone, Copy)]
 pub struct Noise {
-    /// Relative to the rms of the signal.
+    /// Relative to the RMS of the signal.
     pub share: f64,
     /// The same in both records, or the same share of both.
     pub absolute: bool,
-    /// Correlation from one sample to the next.
+    /// Correlation between successive samples.
     pub memory: f64,
-    /// Smallest step of the recorder over the noise; 0 for none.
+    /// Quantisation step of the recorder relative to the noise; 0 for none.
     pub quantum: f64,
 }
 
-/// Constants that differ from those of the thesis by 2 to 20 per cent, either way.
+/// Constants that differ from those of the thesis by 2 to 20 per cent in either direction.
 fn constants(draw: &mut Draw) -> Constants {
     let mut off = |value: f64| value * (1.0 + draw.sign() * draw.log_between(0.02, 0.2));
     let thesis = Constants::hertel();
@@ -87,7 +87,7 @@ fn constants(draw: &mut Draw) -> Constants {
     }
 }
 
-/// Training and held-out input. `alike` keeps the held-out one at the level of the training.
+/// Training and held-out input. `alike` gives both the same level.
 fn excitations(draw: &mut Draw, alike: bool) -> [Excitation; 2] {
     let rms = draw.log_between(1.0, 8.0);
     let settled = draw.chance(0.6);
@@ -113,7 +113,7 @@ fn excitations(draw: &mut Draw, alike: bool) -> [Excitation; 2] {
     [first, second]
 }
 
-/// Strengths from marginal to plain to see: the plain fit's noise-free residual over the noise.
+/// Strengths from marginal to obvious: the plain fit's noise-free residual over the noise.
 pub fn target(draw: &mut Draw, number: usize) -> f64 {
     match number % 4 {
         0 => draw.log_between(0.3, 1.0),
@@ -163,7 +163,7 @@ impl Noise {
         }
     }
 
-    /// Adds noise of an rms and the steps of the recorder; the rms of both together.
+    /// Adds noise of an RMS and the quantisation of the recorder; returns the RMS of both together.
     pub fn add(&self, samples: &mut [f64], rms_n_m: f64, draw: &mut Draw) -> f64 {
         let fresh = (1.0 - self.memory * self.memory).sqrt();
         let mut noise = draw.normal();

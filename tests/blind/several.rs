@@ -1,4 +1,4 @@
-//! Records with several effects at once: each in a size of its own, all of them in one stand.
+//! Records with several effects at once, each with its own size, in one stand.
 
 use super::catalogue::{CATALOGUE, Variant};
 use super::draw::Draw;
@@ -8,14 +8,14 @@ use super::plant::{Built, Constants, OnDense, Scene};
 use super::setting::Setting;
 use super::sizing::{Fitted, in_setting, sized};
 
-/// How many effects the records of a name have.
+/// Number of effects in the records of a name.
 pub const SEVERAL: [(&str, usize); 2] = [("two", 2), ("three", 3)];
 
-/// Records with an effect that no list has beside one that is listed.
+/// Records with an unlisted effect in addition to a listed one.
 pub const MIXED: &str = "mixed";
 
-/// Definitions that act together, in the order of the chain from motion to record. Left out: those that switch the
-/// motion off (sticking) or replace the whole signal (a complex stiffness).
+/// Definitions that can be combined, in the order of the chain from motion to record. Excluded: those that stop
+/// the motion (sticking) or replace the whole signal (a complex stiffness).
 const TOGETHER: &[(&str, &str)] = &[
     ("second-mode", "coupled"),
     ("second-mode", "modal"),
@@ -40,17 +40,18 @@ const TOGETHER: &[(&str, &str)] = &[
     ("thermal-drift", "linear"),
     ("rotor-imbalance", "once"),
 ];
-/// Effects that no record tells apart where both are small, or whose order in the chain matters and is not kept.
+/// Effects that no record distinguishes if both are small, or whose order in the chain matters and is not
+/// preserved.
 const APART: [[&str; 2]; 2] = [
     ["recorder-lowpass", "time-delay"],
     ["saturation", "capacitive-coupling"],
 ];
-/// Least strength of an effect, over the largest in the record.
+/// Minimum strength of an effect relative to the largest in the record.
 const WEAKEST: f64 = 0.2;
-/// Strength of an effect over the one aimed at.
+/// Strength of an effect relative to the target.
 const COMPARABLE: [f64; 2] = [0.6, 1.7];
 
-/// Definitions of different effects, drawn; in the order of the chain.
+/// Random definitions of different effects, in the order of the chain.
 pub fn drawn(effect: &str, seed: u64) -> Option<Vec<&'static Variant>> {
     if effect == MIXED {
         return Some(mixed(&mut Draw::new(seed, "unlisted beside listed")));
@@ -81,7 +82,7 @@ pub fn drawn(effect: &str, seed: u64) -> Option<Vec<&'static Variant>> {
     found.collect()
 }
 
-/// One that is listed and one that is not, whose laws can be added.
+/// A listed and an unlisted one, whose laws can be added.
 fn mixed(draw: &mut Draw) -> Vec<&'static Variant> {
     let unlisted: Vec<&Variant> = CATALOGUE
         .iter()
@@ -95,7 +96,7 @@ fn mixed(draw: &mut Draw) -> Vec<&'static Variant> {
     listed.into_iter().chain([stranger]).collect()
 }
 
-/// Each effect alone, in the size that gives it about the strength wanted.
+/// Each effect alone, with the size for about the wanted strength.
 pub fn parts(
     setting: &Setting,
     scene: &Scene,
@@ -114,14 +115,14 @@ pub fn parts(
     parts.collect()
 }
 
-/// Whether no effect is so much weaker than another that it does not count beside it: some are bounded by what is physical.
+/// Whether no effect is so much weaker than another that it is negligible: some are bounded by physical limits.
 pub fn are_comparable(parts: &[Fitted]) -> bool {
     let strengths = parts.iter().map(|part| part.strength);
     let largest = strengths.clone().fold(0.0, f64::max);
     strengths.fold(f64::INFINITY, f64::min) >= WEAKEST * largest
 }
 
-/// All effects in one stand; one alone stays as it is.
+/// All effects in one stand; a single one is unchanged.
 pub fn together(
     setting: &Setting,
     variants: &[&'static Variant],
@@ -152,7 +153,7 @@ pub fn together(
     }
 }
 
-/// One stand with all effects: what each adds to the motion is added, what each makes of the signal follows in order.
+/// One stand with all effects: contributions to the motion are added, operations on the signal follow in order.
 pub fn joined(
     constants: Constants,
     variants: &[&Variant],
@@ -169,7 +170,8 @@ pub fn joined(
             parameters: own,
         } = part;
         match (variant.effect, own.first()) {
-            // A filter takes what all others make of the motion, not the motion of the plain stand.
+            // A filter applies to the motion with all other effects, not to that of the plain
+            // stand.
             ("recorder-lowpass", Some((_, corner_hz))) => on_dense.push(low_pass(*corner_hz)),
             _ => motions.push(dynamics),
         }
@@ -189,7 +191,7 @@ pub fn joined(
     }
 }
 
-/// `y' = w (u − y)`, exact for straight lines between the points of the dense grid.
+/// `y' = w (u − y)`, exact for linear interpolation between the points of the dense grid.
 fn low_pass(corner_hz: f64) -> OnDense {
     Box::new(move |mut dense: Dense| {
         let step = std::f64::consts::TAU * corner_hz * dense.step_s;
@@ -205,14 +207,14 @@ fn low_pass(corner_hz: f64) -> OnDense {
     })
 }
 
-/// Motions of which each is the plain stand's with something added to it; at most one of them switches.
+/// Motions that each add a term to that of the plain stand; at most one of them switches.
 struct Together {
     constants: Constants,
     motions: Vec<Box<dyn Dynamics>>,
 }
 
 impl Together {
-    /// Each motion with the state that it sees, and the place of its own states.
+    /// Each motion with the state that it sees, and the index of its own states.
     fn each<'a>(
         &'a self,
         state: &'a State,

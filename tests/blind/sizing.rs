@@ -1,4 +1,4 @@
-//! The size of an effect that gives it a strength, by trying.
+//! Size of an effect for a given strength, by iteration.
 
 use super::catalogue::Variant;
 use super::draw::Draw;
@@ -8,7 +8,7 @@ use super::plain_fit::{PlainConstants, fit, rms};
 use super::plant::{Built, Place, Plain, Scene};
 use super::setting::Setting;
 
-/// What the plain stand does with the training input.
+/// Response of the plain stand to the training input.
 pub fn scene(setting: &Setting) -> Scene {
     let constants = setting.constants;
     let dense = run(&Plain(constants), &setting.inputs[0]);
@@ -47,7 +47,7 @@ pub fn in_setting(setting: &Setting, built: &Built, record: usize, seed: u64) ->
     sampled(built, setting.recorded(record), dense, (record, seed))
 }
 
-/// What the recorder is given.
+/// Input of the recorder.
 fn shown(built: &Built, input: &Input) -> Dense {
     let dense = run(built.dynamics.as_ref(), input);
     match &built.on_dense {
@@ -65,7 +65,7 @@ fn sampled(built: &Built, input: &Input, dense: Dense, (record, seed): (usize, u
     samples
 }
 
-/// An effect in its final size.
+/// An effect with its final size.
 pub struct Fitted {
     pub size: f64,
     pub built: Built,
@@ -74,7 +74,7 @@ pub struct Fitted {
     pub strength: f64,
 }
 
-/// One try of a size.
+/// One trial of a size.
 fn try_size(
     setting: &Setting,
     scene: &Scene,
@@ -99,7 +99,7 @@ fn try_size(
     }
 }
 
-/// The size at which the effect has about the strength aimed at, within what is physical.
+/// The size at which the effect has about the target strength, within physical limits.
 pub fn sized(
     setting: &Setting,
     scene: &Scene,
@@ -141,7 +141,7 @@ pub fn sized(
         *side = size;
         size = (size * (off / power).clamp(-3.0, 3.0).exp()).clamp(least, most);
         if size <= too_small || size >= too_large {
-            // An effect with a threshold: between what was too little and what was too much.
+            // An effect with a threshold: between the last sizes below and above it.
             size = (too_small.max(too_large * 1e-3) * too_large).sqrt();
         }
     }

@@ -1,23 +1,24 @@
-//! The lengths of time that a case has of its own, and how its seconds are written.
+//! Time scales of a case, and the unit of its seconds.
 
 use super::excitation::{LENGTH_S, RATE_HZ, SAMPLES};
 
-/// Records are made at 20 kHz with a stand of some hundred hertz. Written down, every second of theirs is `slower`
-/// seconds: the same record is that of a stand of half a hertz or of five kilohertz.
+/// Records are made at 20 kHz with a stand of some hundred hertz. In the files, each of their seconds is `slower`
+/// seconds, so that the same record is that of a stand of half a hertz or of five kilohertz.
 #[derive(Debug, Clone, Copy)]
 pub struct Span {
-    /// Samples of a record.
+    /// Number of samples per record.
     pub samples: usize,
-    /// How long the input acts before the record of a stand that has settled.
+    /// Duration of the input before the record of a settled stand.
     pub settling_s: f64,
-    /// Natural frequency over that of the thesis' stand: what is drawn in its band moves along.
+    /// Natural frequency relative to the thesis' stand; frequencies drawn in its band scale with
+    /// it.
     pub faster: f64,
-    /// Written seconds per second.
+    /// Seconds in the file per second.
     pub slower: f64,
 }
 
 impl Span {
-    /// The records of the thesis' stand. It has settled to 1e-11 after the time stated.
+    /// Records of the thesis' stand. It has settled to 1e-11 after the given time.
     pub const THESIS: Self = Self {
         samples: SAMPLES,
         settling_s: 0.12,
@@ -30,22 +31,22 @@ impl Span {
         self.samples as f64 / RATE_HZ
     }
 
-    /// Length over that of the records of the thesis' stand.
+    /// Length relative to the records of the thesis' stand.
     pub fn longer(&self) -> f64 {
         self.length_s() / LENGTH_S
     }
 
-    /// A frequency as it is written.
+    /// A frequency as in the files.
     pub fn written_hz(&self, frequency_hz: f64) -> f64 {
         frequency_hz / self.slower
     }
 
-    /// Samples a second as they are written.
+    /// Sampling rate as in the files.
     pub fn written_rate_hz(&self) -> f64 {
         self.written_hz(RATE_HZ)
     }
 
-    /// A parameter as it is written; its name ends with its unit.
+    /// A parameter as in the files; its name ends with its unit.
     pub fn written(&self, name: &str, value: f64) -> f64 {
         const POWERS: [(&str, i32); 7] = [
             ("_hz", -1),

@@ -1,4 +1,4 @@
-//! The truth about a case, as it is written beside the records.
+//! The truth about a case, written next to the records.
 
 use serde_json::{Value, json};
 
@@ -8,8 +8,8 @@ use super::plain_fit::rms;
 use super::setting::Setting;
 use super::sizing::Fitted;
 
-/// Effect, size, strength, noise, constants and records; `held_left` is what the plain fit leaves of the
-/// held-out signal.
+/// Effect, size, strength, noise, constants and records; `held_left` is the residual of the plain fit to
+/// the held-out signal.
 pub fn truth(
     effect: &str,
     variants: &[&Variant],
@@ -78,7 +78,7 @@ pub fn truth(
     truth
 }
 
-/// What only the records of other stands than that of the thesis have.
+/// Entries of records of stands other than that of the thesis.
 fn wide(setting: &Setting) -> Value {
     let span = &setting.span;
     let noise = setting.applied_noise.as_ref();
@@ -98,7 +98,7 @@ fn wide(setting: &Setting) -> Value {
     })
 }
 
-/// The definitions that a case was made with.
+/// The definitions of a case.
 fn described(variants: &[&Variant]) -> String {
     match variants {
         [one] => one.name.to_owned(),

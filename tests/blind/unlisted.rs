@@ -1,4 +1,4 @@
-//! Effects that are on no list, besides those in the other files that say so.
+//! Unlisted effects, in addition to those marked as such in the other files.
 
 use std::f64::consts::TAU;
 
@@ -7,7 +7,7 @@ use super::excitation::RATE_HZ;
 use super::integrate::{Dynamics, State};
 use super::plant::{Built, Place, Plain, Scene, With};
 
-/// Stiffness that changes in time: evenly over the record.
+/// Stiffness that changes linearly over the record.
 pub fn softening_in_time(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let share = size * draw.sign();
     let (stiffness, length_s) = (scene.constants.stiffness_n_m, scene.span.length_s());
@@ -19,9 +19,9 @@ pub fn softening_in_time(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     Built::dynamics(system, &[("share_at_end", share)])
 }
 
-/// Stiffness that swings with a frequency of its own.
+/// Stiffness that oscillates at its own frequency.
 pub fn swinging_stiffness(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
-    // Some periods a record, slow beside the stand.
+    // Some periods per record, slow compared with the stand.
     let low_hz = 1.5 / scene.span.longer();
     let high_hz = (40.0 / scene.span.longer()).min(118.0 * scene.span.faster);
     let frequency_hz = draw.log_between(low_hz, high_hz.max(1.2 * low_hz));
@@ -54,14 +54,14 @@ impl Dynamics for DeadZone {
     }
 }
 
-/// Small torques do not arrive.
+/// Small torques have no effect.
 pub fn dead_zone(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     let half = size * scene.applied_rms;
     let plain = Plain(scene.constants);
     Built::dynamics(DeadZone { plain, half }, &[("half_width_n_m", half)])
 }
 
-/// Single samples far off.
+/// Single outliers.
 pub fn spikes(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let count = (draw.between(10.0, 80.0) * scene.span.longer().sqrt()).floor();
     let height = size * scene.shown_rms * 10.0;
@@ -74,7 +74,7 @@ pub fn spikes(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     Built::samples(scene, change, &[("count", count), ("height_n_m", height)])
 }
 
-/// The recorder holds its last value now and then.
+/// The recorder occasionally holds its last value.
 pub fn dropouts(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let length = draw.between(10.0, 60.0).floor();
     let length = length.min((scene.span.samples / 40) as f64);
@@ -89,7 +89,7 @@ pub fn dropouts(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     Built::samples(scene, change, &[("count", count), ("samples_each", length)])
 }
 
-/// Noise that grows with the signal: a gain that trembles slowly.
+/// Noise that grows with the signal: a slowly fluctuating gain.
 pub fn trembling_gain(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let corner_hz = draw.log_between(2.0, 100.0) * scene.span.faster;
     let change = move |place: &mut Place, samples: &mut [f64]| {
@@ -103,7 +103,7 @@ pub fn trembling_gain(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     Built::samples(scene, change, &[("share", size), ("corner_hz", corner_hz)])
 }
 
-/// Noise in proportion to the signal, white.
+/// White noise proportional to the signal.
 pub fn multiplicative_noise(scene: &Scene, size: f64, _: &mut Draw) -> Built {
     let change = move |place: &mut Place, samples: &mut [f64]| {
         for sample in samples {
@@ -125,7 +125,7 @@ pub fn fading_gain(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     Built::samples(scene, change, &[("share", share)])
 }
 
-/// Steps of the zero, as of a loose connector.
+/// Steps of the zero, as from a loose connector.
 pub fn zero_steps(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
     let count = draw.between(2.0, 6.0).floor();
     let height = size * scene.shown_rms;

@@ -1,5 +1,5 @@
-//! Settings far from the thesis' stand: 0.5 Hz to 5 kHz, hardly to strongly damped, five kinds of input, noise on the
-//! applied torque, filters in front of the recorder, records of 20 periods and more.
+//! Settings far from the thesis' stand: 0.5 Hz to 5 kHz, lightly to strongly damped, five kinds of input, noise on
+//! the applied torque, filters before the recorder, records of 20 periods and more.
 
 use std::f64::consts::TAU;
 
@@ -15,17 +15,17 @@ use super::plant::Constants;
 use super::setting::{AppliedNoise, Noise, Setting, target};
 use super::span::Span;
 
-/// Natural frequencies that are drawn around, as written.
+/// Nominal natural frequencies, as in the files.
 pub const NATURAL_HZ: [f64; 4] = [0.5, 20.0, 590.0, 5000.0];
-/// Part of the rms of the applied torque that its noise has.
+/// Noise of the applied torque relative to its RMS.
 const APPLIED_NOISE: f64 = 0.005;
-/// Time constants after which a stand counts as settled, and the longest that is waited.
+/// Time constants after which a stand counts as settled, and the maximum waiting time.
 const SETTLED: f64 = 12.0;
 const LONGEST_S: f64 = 1.6;
 
 const KINDS: [&str; 5] = ["multisine", "sweep", "random", "steps", "hits"];
 
-/// The stand of a case and its time.
+/// The stand of a case and its time scale.
 fn stand(draw: &mut Draw) -> (Constants, Constants, Span) {
     let natural_hz = draw.log_between(330.0, 1600.0);
     let written_hz = draw.one_of(&NATURAL_HZ) * draw.between(0.8, 1.2);
@@ -60,7 +60,7 @@ fn stand(draw: &mut Draw) -> (Constants, Constants, Span) {
     (constants, declared, span)
 }
 
-/// A multisine of some periods a record.
+/// A multisine with some periods per record.
 fn multisine(draw: &mut Draw, rms: f64, top_hz: f64, span: &Span, settled: bool) -> Excitation {
     // Between 12 and 1200 lines.
     let cycles = top_hz * span.length_s();
@@ -110,7 +110,7 @@ fn steps(draw: &mut Draw, rms: f64, natural_hz: f64, span: &Span, settled: bool)
     } else {
         0
     };
-    // At least a dozen plateaus a record.
+    // At least a dozen plateaus per record.
     let each = (period * draw.log_between(1.0, 10.0)).min(span.samples as f64 / 12.0);
     Excitation::Steps(Steps {
         plateaus: Steps::drawn(draw, rms, before + span.samples + 8, each),
@@ -122,7 +122,7 @@ fn steps(draw: &mut Draw, rms: f64, natural_hz: f64, span: &Span, settled: bool)
 fn hits(draw: &mut Draw, height: f64, natural_hz: f64, span: &Span) -> Excitation {
     let period = RATE_HZ / natural_hz;
     let width = (period * draw.between(0.2, 1.0)).max(8.0);
-    // A half sine has corners: no less than 30 samples, so that the record follows it.
+    // A half-sine has corners: at least 30 samples, so that the record resolves it.
     let smooth = width < 30.0 || draw.chance(0.5);
     let apart = (period * draw.between(6.0, 30.0)).max(3.0 * width);
     let both = draw.chance(0.5);
@@ -145,7 +145,7 @@ fn hits(draw: &mut Draw, height: f64, natural_hz: f64, span: &Span) -> Excitatio
     })
 }
 
-/// Training and held-out input: the same kind, mostly at another level, or another kind.
+/// Training and held-out input: the same kind, usually at another level, or another kind.
 fn excitations(
     draw: &mut Draw,
     natural_hz: f64,
@@ -194,7 +194,7 @@ fn excitations(
     [first, second]
 }
 
-/// Noise on the applied torque as recorded, and what the true plain stand makes of it.
+/// Noise on the applied torque as recorded, and the response of the true plain stand to it.
 fn applied_noise(constants: Constants, recorded: [&[f64]; 2], seed: u64) -> AppliedNoise {
     let made = [0, 1].map(|index: usize| {
         let mut draw = Draw::new(
@@ -217,7 +217,7 @@ fn applied_noise(constants: Constants, recorded: [&[f64]; 2], seed: u64) -> Appl
     }
 }
 
-/// What a plain stand makes of samples, as if they went on like this for ever.
+/// Response of a plain stand to samples that repeat periodically.
 pub fn answered(constants: Constants, samples: &[f64]) -> Vec<f64> {
     let length = samples.len();
     let (forward, inverse) = (
@@ -249,7 +249,7 @@ pub fn answered(constants: Constants, samples: &[f64]) -> Vec<f64> {
 
 fn filter(draw: &mut Draw, plateaus: bool) -> Option<AntiAlias> {
     let (order, part) = match plateaus {
-        // What is left of a jump above half the sampling rate shows as ringing that no sample of the input explains.
+        // The remainder of a jump above the Nyquist frequency shows as ringing that no sample of the input explains.
         true => (4, draw.between(0.25, 0.3)),
         false => (draw.one_of(&[2, 4]), draw.between(0.25, 0.4)),
     };
@@ -291,7 +291,7 @@ pub fn setting(seed: u64, number: usize, alike: bool, plateaus: bool) -> Setting
     setting
 }
 
-/// Whether a definition takes plateaus: the rate of a jump cannot be recorded, and what answers before its cause has no
+/// Whether a definition permits plateaus: the derivative of a jump cannot be recorded, and a non-causal response has no
 /// record to begin in.
 pub fn takes_plateaus(variants: &[&Variant]) -> bool {
     !variants.iter().any(|variant| {
@@ -303,7 +303,7 @@ pub fn takes_plateaus(variants: &[&Variant]) -> bool {
     })
 }
 
-/// Whether records of a setting could show a definition: the mains have their own frequency.
+/// Whether records of a setting could show a definition: the mains have a fixed frequency.
 pub fn suits(setting: &Setting, variants: &[&Variant]) -> bool {
     let mains = variants.iter().any(|v| v.effect == "mains-pickup");
     let span = &setting.span;

@@ -37,7 +37,8 @@ pub fn measured_column(case: &Case) -> &'static str {
 /// A record as a table.
 pub fn table(record: &Record, volts: bool) -> String {
     let rate_hz = record.span.written_rate_hz();
-    // A millionth of a step and finer, but for the rate of the thesis' stand, whose steps are whole in five.
+    // A millionth of a step or finer, except for the rate of the thesis' stand, whose steps need five
+    // decimals.
     let decimals = if record.span.slower == 1.0 {
         5
     } else {
@@ -95,7 +96,7 @@ fn declared(case: &Case) -> String {
     )
 }
 
-/// Writes a case into a folder of its own.
+/// Writes a case into a separate folder.
 pub fn write(case: &Case, folder: &Path) -> io::Result<()> {
     std::fs::create_dir_all(folder)?;
     let volts = in_volts(case);

@@ -1,4 +1,4 @@
-//! Records for the golden outputs, made from closed forms and small recursions, with no code of torqcomp.
+//! Records for the golden outputs, from closed forms and small recursions, independent of torqcomp.
 
 mod mcap_files;
 
@@ -56,7 +56,7 @@ fn table(headings: &str, rate_hz: f64, columns: &[Vec<f64>]) -> String {
     text
 }
 
-/// The stand of figure 5 of the thesis after a blow: 1.7 ms a cycle, from 2 to 0.5 mV in 5.3 ms.
+/// The stand of figure 5 of the thesis after a blow: 1.7 ms per cycle, from 2 to 0.5 mV in 5.3 ms.
 fn decay() -> String {
     let mut noise = Noise(17);
     let sigma = 4.0_f64.ln() / 5.3e-3;
@@ -71,7 +71,7 @@ fn decay() -> String {
     )
 }
 
-/// What a filter of one mode at 60 Hz gives at 1 kHz, by its recursion.
+/// Output of a one-mode filter at 60 Hz for 1 kHz, by its recursion.
 fn ringing(applied: &[f64]) -> Vec<f64> {
     let (fall, turn) = (0.989_f64, (TAU * 0.06).cos());
     let gain = 1.0 - 2.0 * fall * turn + fall * fall;
@@ -85,7 +85,7 @@ fn ringing(applied: &[f64]) -> Vec<f64> {
     applied.iter().map(step).collect()
 }
 
-/// Input and answer of that filter, with noise on the answer.
+/// Input and output of that filter, with noise on the output.
 fn driven(headings: &str, applied: Vec<f64>, seed: u64) -> String {
     let mut noise = Noise(seed);
     let answer = ringing(&applied)
@@ -115,7 +115,7 @@ fn noise() -> String {
     )
 }
 
-/// Six periods of 500 samples with lines to 200 Hz, after one that settles.
+/// Six periods of 500 samples with lines to 200 Hz, after one for settling.
 fn periods() -> String {
     let mut noise = Noise(23);
     let phases: Vec<f64> = (1..100).map(|_| TAU * noise.uniform()).collect();
@@ -175,7 +175,7 @@ fn sweep() -> String {
     )
 }
 
-/// A few samples beside the rate: for `compensate` and `harmonics` in other formats.
+/// A few samples with the rate: for `compensate` and `harmonics` in other formats.
 fn short() -> String {
     let value = |i: usize| {
         let t = i as f64 / 10_000.0;

@@ -1,7 +1,8 @@
-//! Every verb's output, whole: text, JSON, exit code, standard error and the files written, SVG and HTML included.
+//! Complete outputs of every command: text, JSON, exit code, standard error and the files written, including SVG and
+//! HTML.
 //!
-//! `cases/VERB/NAME.txt` holds commands (lines that begin with `$ `) and what each of them gives. To add a case, write
-//! its commands alone and accept what comes out. To accept a deliberate change, with the reason in the commit:
+//! `cases/VERB/NAME.txt` contains commands (lines that begin with `$ `) and their outputs. To add a case, write its
+//! commands only and accept the output. To accept a deliberate change, with the reason in the commit:
 //!
 //! ```text
 //! SNAPSHOTS=overwrite cargo test --test tests golden
@@ -9,8 +10,8 @@
 //! ```
 //!
 //! Commands run in a folder with `examples/`, `recordings/` (from `tests/recordings`), `stands/` (from
-//! `tests/golden/stands`) and `made/` (the files of [`made`]); `OUT` stands for a folder of the case. `< FILE` feeds
-//! standard input. Machines differ in the last bits of a number, so decimal numbers are rounded to nine digits, and count as
+//! `tests/golden/stands`) and `made/` (the files of [`made`]); `OUT` is a folder of the case. `< FILE` feeds standard
+//! input. Machines differ in the last bits of a number, so decimal numbers are rounded to nine digits, and count as
 //! equal within a relative difference of 1e-6, or of the tolerance in a line `# tolerance 1e-3` above the commands.
 
 mod made;
@@ -43,7 +44,7 @@ verbs!(
     predict, simulate, table
 );
 
-/// A folder of cases without a test would not be noticed.
+/// A folder of cases without a test would go unnoticed.
 #[test]
 fn every_folder_of_cases_is_run() {
     let mut found: Vec<String> = fs::read_dir(Path::new(PROJECT).join("tests/golden/cases"))
@@ -60,7 +61,7 @@ fn every_folder_of_cases_is_run() {
     assert_eq!(found, VERBS);
 }
 
-/// Runs all cases of a verb, and fails with the difference of each that gives something else.
+/// Runs all cases of a command, and fails with the difference of each that changed.
 fn check(verb: &str) {
     let folder = Path::new(PROJECT).join("tests/golden/cases").join(verb);
     let mut cases: Vec<PathBuf> = fs::read_dir(&folder)
@@ -115,7 +116,7 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// What the commands of a case give: the golden file as it should be.
+/// Output of the commands of a case, in the form of the golden file.
 fn run(verb: &str, case: &Path, expected: &str) -> String {
     let name = case.file_stem().and_then(|s| s.to_str()).expect("a name");
     let out = format!("out/{verb}-{name}");
@@ -148,7 +149,7 @@ fn run(verb: &str, case: &Path, expected: &str) -> String {
     text
 }
 
-/// Words of the commands of all cases, behind the name of the program; `OUT/` stands for a folder.
+/// Words of the commands of all cases, without the name of the program; `OUT/` is a folder.
 pub fn commands() -> Vec<Vec<String>> {
     let folders = files(&Path::new(PROJECT).join("tests/golden/cases"));
     let cases = folders.iter().flat_map(|folder| files(folder));
@@ -187,7 +188,7 @@ fn execute(command: &str) -> std::process::Output {
         .expect("the binary starts")
 }
 
-/// What a run of the binary in the folder of the golden outputs left.
+/// Results of a run of the binary in the folder of the golden outputs.
 pub struct Ran {
     pub code: i32,
     pub stdout: String,
@@ -238,7 +239,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// A part of a golden file, if there is anything in it.
+/// A section of a golden file, if not empty.
 fn section(text: &mut String, name: &str, content: &[u8]) {
     if content.is_empty() {
         return;

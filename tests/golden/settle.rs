@@ -1,19 +1,20 @@
-//! Texts with numbers in them, made such that the same result gives the same text on any machine.
+//! Normalisation of numbers in texts, so that the same result gives the same text on any machine.
 
 use std::fmt::Write as _;
 
-/// Significant digits that are kept.
+/// Number of significant digits kept.
 const DIGITS: usize = 9;
-/// Rows of a table that are written out when it is longer than [`LONG`].
+/// Number of rows written for a table longer than [`LONG`].
 const KEPT: usize = 16;
 const LONG: usize = 48;
 /// Relative difference of numbers that count as equal, unless a golden file says otherwise.
 const TOLERANCE: f64 = 1e-6;
-/// Magnitude below which a number is what rounding leaves of zero.
+/// Magnitude below which a number is zero within rounding.
 const ZERO: f64 = 1e-11;
 
-/// A text with its decimal numbers rounded, the middle of its long tables replaced by sums, and of a page neither the
-/// hashes of its inputs, whose last digits differ between machines, nor style and script, which are files of their own.
+/// A text with its decimal numbers rounded and the middle of its long tables replaced by sums; a page without the
+/// hashes of its inputs, whose last digits differ between machines, and without style and script, which are files of
+/// their own.
 pub fn readable(content: &str) -> String {
     let content = &without(
         "<script>",
@@ -37,7 +38,7 @@ pub fn readable(content: &str) -> String {
     text
 }
 
-/// A page without what stands between two marks.
+/// A page without the text between two marks.
 fn without(from: &str, to: &str, content: &str) -> String {
     let is_page = content.starts_with("<!DOCTYPE");
     match (content.split_once(from), content.split_once(to)) {
@@ -60,7 +61,7 @@ fn without_sums(content: &str) -> String {
     text
 }
 
-/// The cells of a line that holds nothing but numbers.
+/// The cells of a line that contains only numbers.
 fn row(line: &str) -> Option<Vec<f64>> {
     let cell = |cell: &str| match cell {
         "" => Some(0.0),
@@ -70,7 +71,7 @@ fn row(line: &str) -> Option<Vec<f64>> {
     cells.filter(|cells| cells.len() > 1)
 }
 
-/// Lines; of many, some, and the sums of magnitudes of those between.
+/// Lines; if there are many, some of them, with the sums of magnitudes of those between.
 fn table(text: &mut String, lines: &[&str]) {
     if lines.len() <= LONG {
         lines.iter().for_each(|line| text.push_str(&rounded(line)));
@@ -131,7 +132,8 @@ fn round(number: &str) -> String {
     }
 }
 
-/// The actual text with its lines as the golden file has them, where they differ by no more than rounding.
+/// The actual text, with lines replaced by those of the golden file if they differ by no more than
+/// rounding.
 pub fn settle(expected: &str, actual: &str) -> String {
     let told = expected.lines().take_while(|line| line.starts_with("# "));
     let tolerance = told
@@ -162,7 +164,7 @@ fn equal(a: &str, b: &str, tolerance: f64) -> bool {
 }
 
 fn near(a: &str, b: &str, tolerance: f64) -> bool {
-    // What has nine digits before the point is a time stamp or a count.
+    // A number with nine digits before the point is a time stamp or a count.
     let exact = |number: &str| number.find('.').is_some_and(|point| point >= 9);
     match (a.parse::<f64>(), b.parse::<f64>()) {
         (Ok(x), Ok(y)) if !exact(a) && !exact(b) => {
@@ -181,7 +183,7 @@ enum Token<'a> {
     Number(&'a str),
 }
 
-/// The pieces of a line. Whole numbers are text: a count that changes is another result.
+/// The pieces of a line. Integers are text: a changed count is a different result.
 fn tokens(line: &str) -> impl Iterator<Item = Token<'_>> {
     let mut at = 0;
     std::iter::from_fn(move || {
@@ -208,7 +210,7 @@ fn tokens(line: &str) -> impl Iterator<Item = Token<'_>> {
     })
 }
 
-/// Length of the decimal number that a text begins with, 0 if it begins with none.
+/// Length of the decimal number at the start of a text, 0 if there is none.
 fn number(text: &str, before: Option<u8>) -> usize {
     let bytes = text.as_bytes();
     let digits = |from: usize| {

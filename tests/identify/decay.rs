@@ -1,4 +1,4 @@
-//! Decays: how exact they are, how often the intervals hold the truth, modes and laws of damping.
+//! Decays: accuracy, coverage of the intervals, modes and damping laws.
 
 use nalgebra::DMatrix;
 use torqcomp::identify::{Identification, decay};
@@ -16,14 +16,14 @@ fn ring(times_s: &[f64], values: &[f64], rate_hz: f64) -> (Identification, Vec<d
     decay::identify(&[record], &decay::DecayOptions::default()).unwrap()
 }
 
-/// The stand of figure 5: 1.7 ms a cycle, from 2 to 0.5 in 5.3 ms.
+/// The stand of figure 5: 1.7 ms per cycle, from 2 to 0.5 in 5.3 ms.
 const OMEGA: f64 = TAU / 1.7e-3;
 
 fn sigma() -> f64 {
     4.0_f64.ln() / 5.3e-3
 }
 
-/// A decay of that stand with an offset and noise so many decibels below its first amplitude.
+/// A decay of that stand with an offset and noise `decibel` below its initial amplitude.
 pub fn figure_5(decibel: f64, noise: &mut Noise) -> (Vec<f64>, Vec<f64>, f64) {
     let rate_hz = 40_000.0;
     let t = times(1200, rate_hz);
@@ -65,8 +65,8 @@ fn intervals_of_decays_cover_the_truth() {
     }
 }
 
-/// Least standard deviations of frequency (Hz) and decay rate (1/s) that any unbiased estimator can have
-/// (Cramér and Rao), from the sensitivities of Ae^{−σt}cos(ωt + φ) + c + dt to σ, ω, A, φ, c, d.
+/// Minimum standard deviations of frequency (Hz) and decay rate (1/s) for any unbiased estimator
+/// (Cramér–Rao bound), from the sensitivities of Ae^{−σt}cos(ωt + φ) + c + dt to σ, ω, A, φ, c, d.
 fn least_std(t: &[f64], (amplitude, sigma, omega): (f64, f64, f64), std: f64) -> (f64, f64) {
     let length = t[t.len() - 1];
     let rows = DMatrix::from_fn(t.len(), 6, |i, j| {
@@ -85,7 +85,7 @@ fn least_std(t: &[f64], (amplitude, sigma, omega): (f64, f64, f64), std: f64) ->
     (bound[(1, 1)].sqrt() / TAU, bound[(0, 0)].sqrt())
 }
 
-/// A stand: σ in 1/s, ω in rad/s, samples a second, seconds, decays one after another.
+/// A stand: σ in 1/s, ω in rad/s, sampling rate, duration in s, number of successive decays.
 struct Stand {
     sigma: f64,
     omega: f64,
@@ -107,7 +107,7 @@ impl Stand {
         (t, y)
     }
 
-    /// Errors of frequency and damping ratio over the true ones, and of the bounds of both.
+    /// Relative errors of frequency and damping ratio, and the bounds of both.
     fn errors(&self, noise: &mut Noise) -> ([f64; 2], [f64; 2]) {
         let (t, y) = self.record(noise);
         let (found, stretches) = ring(&t, &y, self.rate_hz);
@@ -115,7 +115,7 @@ impl Stand {
         let natural = self.omega.hypot(self.sigma);
         let frequency = of(&found, "damped_frequency").value() * TAU / self.omega - 1.0;
         let ratio = of(&found, "damping_ratio").value() * natural / self.sigma - 1.0;
-        // Each stretch begins where the fit lets it begin; decays add their information.
+        // Each segment begins where the fit starts; decays add their information.
         let (mut of_frequency, mut of_rate) = (0.0, 0.0);
         for stretch in &stretches {
             let late = stretch.start_s % self.length_s;
@@ -133,9 +133,9 @@ impl Stand {
     }
 }
 
-/// Nineteen records in twenty within 0.02 % of the frequency and 1 % of the damping ratio, and the spread no
-/// more than 1.3 times the bound. One decay of the stand of figure 5 at 40 kHz does not hold 0.02 %: its bound is
-/// 0.016 %, so that one record in five would miss it whatever is done; six hits at 50 kHz do.
+/// Nineteen records in twenty within 0.02 % of the frequency and 1 % of the damping ratio, and the spread no more
+/// than 1.3 times the bound. One decay of the stand of figure 5 at 40 kHz cannot reach 0.02 %: its bound is 0.016
+/// %, so that one record in five would miss it whatever the method; six hits at 50 kHz can.
 #[test]
 fn decays_are_as_exact_as_the_noise_allows() {
     let of_thesis = Stand {
@@ -171,7 +171,7 @@ fn decays_are_as_exact_as_the_noise_allows() {
         for i in 0..2 {
             let ratio = squares[i].sqrt() / bounds[i];
             println!("std {:.2e}, over the bound {ratio:.3}", squares[i].sqrt());
-            // 40 runs tell a standard deviation to 11 %.
+            // 40 runs determine a standard deviation to 11 %.
             assert!(ratio < 1.3, "{i}: {ratio} times the bound");
         }
     }
@@ -205,9 +205,9 @@ fn several_modes_and_hits_are_found() {
     }
 }
 
-/// A decay of so many periods that it is filtered to bands around its lines and undersampled: as exact as all samples allow,
-/// var σ = var ω = 16 σ³ s² Δt/A² (Cramér and Rao, for a decay that is recorded to its end), for the mode that rings for long
-/// and for the one that is gone after a thirtieth of the record.
+/// A decay of so many periods that it is filtered to bands around its lines and undersampled: as accurate as all
+/// samples allow, var σ = var ω = 16 σ³ s² Δt/A² (Cramér–Rao, for a decay recorded to its end), for the mode that rings
+/// for long and for the one that has decayed after a thirtieth of the record.
 #[test]
 fn a_decay_of_very_many_periods_is_as_exact_with_fewer_samples() {
     let mut noise = Noise(31);

@@ -1,4 +1,4 @@
-//! `identify` through the binary: reports, stand files, pages, refusals.
+//! `identify` through the binary: reports, stand files, pages, rejections.
 
 use super::decay::figure_5;
 use super::{Noise, TAU, parameter};
@@ -77,7 +77,7 @@ fn the_stand_file_is_updated_in_place() {
         after.contains("source = \"identify decay: decay.csv\""),
         "{after}"
     );
-    // What is written is a stand file.
+    // The output is a valid stand file.
     assert_eq!(folder.run(&["table", "--stand", "stand.toml"]).code, 0);
     folder.write("other.toml", "a = 1\n");
     folder
@@ -126,7 +126,7 @@ fn the_page_is_complete_in_itself() {
     ] {
         assert!(page.contains(part), "{part}");
     }
-    // Its only script is its own, and fetches nothing.
+    // Its only script is inline and fetches nothing.
     for outside in [
         "src=",
         "href=",
@@ -150,7 +150,7 @@ fn the_page_is_complete_in_itself() {
         "--force",
     ]);
     assert_eq!(again.code, 0);
-    // The head names the command and the moment; what was found is the same.
+    // The header contains the command and the time; the results are the same.
     let found = |page: &str| {
         page.split("<svg")
             .skip(1)
@@ -189,7 +189,8 @@ fn what_cannot_be_identified_is_said() {
     folder.run(&args).says(2, &["--inertia", "unit"]);
 }
 
-/// Noise up to half the rate and a file of it beside others, for what cannot be evaluated.
+/// Noise up to the Nyquist frequency and a file of it among others, for records that cannot be
+/// evaluated.
 fn table(folder: &Folder, name: &str, columns: &[(&str, Vec<f64>)]) {
     let head: Vec<&str> = columns.iter().map(|c| c.0).collect();
     let rows: String = (0..columns[0].1.len())
@@ -201,7 +202,7 @@ fn table(folder: &Folder, name: &str, columns: &[(&str, Vec<f64>)]) {
     folder.write(name, format!("time_s,{}\n{rows}", head.join(",")));
 }
 
-/// What was recorded of a filter of one mode at 60 Hz, by its recursion.
+/// Output of a one-mode filter at 60 Hz, by its recursion.
 fn ringing_filter(applied: &[f64]) -> Vec<f64> {
     let (fall, turn) = (0.989_f64, (TAU * 0.06).cos());
     let (mut last, mut before) = (0.0, 0.0);
@@ -283,7 +284,7 @@ fn loads_and_runs_of_nonsense_are_refused() {
     let rough = "0,0\n5,0.4\n10,1.1\n5,0.6\n0,0.1\n5,0.45\n10,0.9\n5,0.5\n0,0\n";
     folder.write("rough.csv", format!("{head}{rough}"));
     loads("rough.csv", "weight", "bridge").says(0, &["poor-fit"]);
-    // An angle of the wrong sign.
+    // An angle with the wrong sign.
     let torque: Vec<f64> = (0..4000)
         .map(|i| (TAU * 0.7e-3 * f64::from(i)).sin())
         .collect();

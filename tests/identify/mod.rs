@@ -1,5 +1,5 @@
 //! `identify` through the binary, and its estimators on simulated records. The records are made here,
-//! from closed forms or by small steps, with no code of the estimators.
+//! from closed forms or by small steps, independent of the estimators.
 
 mod beginnings;
 mod decay;
@@ -28,7 +28,7 @@ fn of<'a>(result: &'a Identification, name: &str) -> &'a NamedEstimate {
         .unwrap_or_else(|| panic!("{name} in {:?}", result.parameters))
 }
 
-/// Share of true values within 1.96 standard uncertainties.
+/// Fraction of true values within 1.96 standard uncertainties.
 #[derive(Default)]
 struct Coverage {
     inside: usize,

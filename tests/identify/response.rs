@@ -1,4 +1,4 @@
-//! Responses: modes from noise, how exact they are and how often the intervals hold the truth.
+//! Responses: modes from noise, accuracy and coverage of the intervals.
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -8,8 +8,8 @@ use torqcomp::identify::{Identification, response};
 use super::{Coverage, Noise, TAU, of, parameter};
 use crate::util::{Folder, assert_close};
 
-/// Noise up to a frequency in Hz and the answer of a mode of 60 Hz with a damping ratio: a part of a longer period, the
-/// response times the spectrum, so that nothing but the cut at both ends is approximate.
+/// Noise up to a frequency in Hz and the response of a 60 Hz mode with a damping ratio: a part of a longer period, the
+/// response times the spectrum, so that only the truncation at both ends is approximate.
 pub(super) fn driven(
     count: usize,
     (top_hz, ratio): (f64, f64),
@@ -61,7 +61,7 @@ fn a_mode_is_found_from_noise() {
     assert_close(pole.rate_per_s, 0.03 * TAU * 60.0, 0.005);
 }
 
-/// A stand of one mode at 60 Hz with a damping ratio of 0.03 and a gain of 1 at rest.
+/// A stand with one mode at 60 Hz, a damping ratio of 0.03 and a static gain of 1.
 const NATURAL: f64 = TAU * 60.0;
 const RATIO: f64 = 0.03;
 const RATE_HZ: f64 = 1000.0;
@@ -75,7 +75,8 @@ fn response_at(omega: f64, natural: f64, ratio: f64) -> Complex64 {
         )
 }
 
-/// Periods of a signal with lines up to 200 Hz of one size and random phases, and the steady answer.
+/// Periods of a signal with lines up to 200 Hz of equal amplitude and random phases, and the
+/// steady-state response.
 fn periods(length: usize, count: usize, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
     let step = RATE_HZ / length as f64;
     let lines: Vec<(f64, f64)> = (1..(200.0 / step) as usize)
@@ -94,8 +95,8 @@ fn periods(length: usize, count: usize, noise: &mut Noise) -> (Vec<f64>, Vec<f64
     (applied, many(&|w| response_at(w, NATURAL, RATIO)))
 }
 
-/// The displacement of a mode of 60 Hz and damping ratio 0.03 under a force, a gain of 1 at rest, by Runge and Kutta's
-/// method in 16 steps a sample; both at 1 kHz.
+/// Displacement of a mode of 60 Hz and damping ratio 0.03 under a force, with a static gain of 1, by the Runge–Kutta
+/// method in 16 steps per sample; both at 1 kHz.
 pub(super) fn driven_by(force: impl Fn(f64) -> f64, count: usize) -> (Vec<f64>, Vec<f64>) {
     let (natural, ratio, steps) = (TAU * 60.0, 0.03, 16);
     let h = 1.0 / RATE_HZ / f64::from(steps);
@@ -123,14 +124,14 @@ pub(super) fn driven_by(force: impl Fn(f64) -> f64, count: usize) -> (Vec<f64>, 
     (applied, shown)
 }
 
-/// Hits a second apart, bells of 3 ms to both sides, and the answer.
+/// Hits a second apart, bell-shaped with 3 ms to both sides, and the response.
 fn hits(count: usize) -> (Vec<f64>, Vec<f64>) {
     let (applied, shown) = driven_by(|t| (-0.5 * ((t - 0.05) / 0.003).powi(2)).exp(), 1000);
     let many = |one: &[f64]| one.iter().copied().cycle().take(1000 * count).collect();
     (many(&applied), many(&shown))
 }
 
-/// The measured signal with noise so many decibels below it.
+/// The measured signal with noise `decibel` below it.
 fn noisy(shown: &[f64], decibel: f64, noise: &mut Noise) -> (Vec<f64>, f64) {
     let mean = shown.iter().map(|v| v * v).sum::<f64>() / shown.len() as f64;
     let size = 10_f64.powf(-decibel / 20.0) * mean.sqrt();
@@ -156,7 +157,7 @@ fn one_mode(applied: &[f64], measured: &[f64], how: response::Excitation) -> Ide
     response::identify(&[record], &options).unwrap()
 }
 
-/// How many of 240 records hold the true frequency, damping ratio and static gain, 20 to 60 dB.
+/// Coverage of the true frequency, damping ratio and static gain in 240 records, 20 to 60 dB.
 fn coverage_of(how: response::Excitation, seed: u64) -> [Coverage; 3] {
     let mut noise = Noise(seed);
     let mut covered = [0; 3].map(|_| Coverage::default());
@@ -198,16 +199,17 @@ fn intervals_of_responses_cover_the_truth() {
     }
 }
 
-/// Least standard deviations of ω_n and ζ, relative, from lines of one block with applied spectrum
-/// `applied`, noise of that power a line and `blocks` blocks. Unknown besides: gain and phase of the mode,
-/// a constant, and a term 1/ω² for what lies outside the band, as in the model that is fitted.
+/// Minimum relative standard deviations of ω_n and ζ, from lines of one block with applied spectrum
+/// `applied`, noise of that power per line and `blocks` blocks. Also unknown: gain and phase of the mode,
+/// a constant, and a term 1/ω² for modes outside the band, as in the fitted model.
 fn least_std(lines: &[(f64, f64)], noise_power: f64, blocks: f64) -> [f64; 2] {
     let columns = |omega: f64| {
         let h = response_at(omega, NATURAL, RATIO);
         let small = 1e-6;
         let by_natural = (response_at(omega, NATURAL * (1.0 + small), RATIO) - h) / small;
         let by_ratio = (response_at(omega, NATURAL, RATIO * (1.0 + small)) - h) / small;
-        // The residue's real and imaginary part: a gain, and a gain in quadrature that goes with ω.
+        // The residue's real and imaginary part: a gain, and a gain in quadrature proportional to
+        // ω.
         let turned = h * Complex64::new(0.0, omega / NATURAL);
         let far = Complex64::new((NATURAL / omega).powi(2), 0.0);
         [by_natural, by_ratio, h, turned, Complex64::ONE, far]
@@ -217,7 +219,7 @@ fn least_std(lines: &[(f64, f64)], noise_power: f64, blocks: f64) -> [f64; 2] {
         let row = columns(*omega);
         for i in 0..6 {
             for j in 0..6 {
-                // Real and imaginary part each have half the noise's power.
+                // Real and imaginary part each have half the noise power.
                 let both = (row[i].conj() * row[j]).re;
                 information[(i, j)] += 2.0 * blocks * applied_power * both / noise_power;
             }
@@ -227,8 +229,8 @@ fn least_std(lines: &[(f64, f64)], noise_power: f64, blocks: f64) -> [f64; 2] {
     [bound[(0, 0)].sqrt(), bound[(1, 1)].sqrt()]
 }
 
-/// Errors of the frequency and damping ratio of 120 records, noise of 40 dB added to what is shown: each within
-/// 0.02 % and 1 %. Returned as squares on average, relative, with the noise's standard deviation.
+/// Errors of the frequency and damping ratio of 120 records, with 40 dB noise added to the measured signal:
+/// each within 0.02 % and 1 %. Returns relative mean squares, and the noise's standard deviation.
 fn squares_at_40_decibels(
     how: response::Excitation,
     applied: &[f64],
@@ -277,8 +279,8 @@ fn responses_are_as_exact_as_the_noise_allows() {
     check_against(least_std(&lines, n * std * std, used as f64), squares);
 }
 
-/// A mode 4 lines of a segment wide, from noise: the bound is that of all lines of the whole record, its ends
-/// known.
+/// A mode 4 lines of a segment wide, from noise: the bound is that of all lines of the whole record with
+/// known ends.
 #[test]
 fn responses_to_noise_are_as_exact_as_the_noise_allows() {
     let mut noise = Noise(26);
@@ -297,7 +299,8 @@ fn responses_to_noise_are_as_exact_as_the_noise_allows() {
     check_against(least_std(&lines, count as f64 * std * std, 1.0), squares);
 }
 
-/// Torque in, torque out tells f/K and J/K; the stiffness of the stand file makes constants of them.
+/// Torque in, torque out gives f/K and J/K; the stiffness of the stand file converts them to
+/// constants.
 #[test]
 fn constants_follow_from_a_declared_stiffness_with_its_uncertainty() {
     let folder = Folder::new();
@@ -344,7 +347,7 @@ fn constants_follow_from_a_declared_stiffness_with_its_uncertainty() {
     let report = folder.json(&[&args[..], &["--stand", "declared.toml"]].concat());
     let (inertia, std, _) = parameter(&report, "inertia");
     assert_close(inertia, 5000.0 / NATURAL.powi(2), 1e-3);
-    // The anchor's 1 % and the record's own part.
+    // The 1 % of the declared stiffness and the record's own contribution.
     assert!(
         (0.0099..0.0102).contains(&(std.unwrap() / inertia)),
         "{std:?}"
@@ -359,7 +362,8 @@ fn constants_follow_from_a_declared_stiffness_with_its_uncertainty() {
     );
 }
 
-/// Torque in, motion out tells J, f and K, whatever the units and the excitation; the stand file gets them.
+/// Torque in, motion out gives J, f and K, whatever the units and the excitation; they are written to the
+/// stand file.
 #[test]
 fn all_constants_follow_from_a_torque_and_the_motion_it_makes() {
     let folder = Folder::new();
@@ -368,7 +372,7 @@ fn all_constants_follow_from_a_torque_and_the_motion_it_makes() {
     let mut noise = Noise(27);
     let (applied, shown) = driven(20_000, (250.0, RATIO), &mut noise);
     let (measured, _) = noisy(&shown, 40.0, &mut noise);
-    // Angles in degrees and torques in pound feet; a gain of 1 at rest is one rad for K.
+    // Angles in degrees and torques in pound feet; a static gain of 1 is one rad for K.
     let rows: String = (0..applied.len())
         .map(|i| {
             let degrees = (measured[i] / stiffness).to_degrees();
@@ -423,8 +427,8 @@ fn all_constants_follow_from_a_torque_and_the_motion_it_makes() {
         "{written}"
     );
     assert!(!written.contains("\"1 N m/rad\""), "{written}");
-    // The errors of J and K are correlated: below the resonance the inverse is 1 − r², which only the frequency moves,
-    // by 2 r²/(1 − r²) of its relative error.
+    // The errors of J and K are correlated: below the resonance the inverse is 1 − r², which only the frequency
+    // changes, by 2 r²/(1 − r²) of its relative error.
     let (frequency, std, _) = parameter(&report, "natural_frequency");
     let table = [
         "table",
@@ -441,7 +445,7 @@ fn all_constants_follow_from_a_torque_and_the_motion_it_makes() {
     let square = (42.0 / frequency) * (42.0 / frequency);
     let expected = 2.0 * square / (1.0 - square) * std.expect("the data tell it") / frequency;
     assert_close(stated.expect("an uncertainty"), expected, 0.05);
-    // A motion against the torque is refused.
+    // A motion opposite to the torque is rejected.
     let turned: String = rows
         .lines()
         .map(|row| {
@@ -461,7 +465,7 @@ fn all_constants_follow_from_a_torque_and_the_motion_it_makes() {
     folder.run(&args).says(1, &["wrong sign"]);
 }
 
-/// Intervals of J, f and K, for every way to excite.
+/// Intervals of J, f and K, for every type of excitation.
 #[test]
 fn intervals_of_constants_cover_the_truth() {
     use response::Excitation::{Impact, Periodic, Random};
@@ -478,7 +482,7 @@ fn intervals_of_constants_cover_the_truth() {
         let decibel = [20.0, 30.0, 40.0, 50.0, 60.0][k / 3 % 5];
         let (measured, _) = noisy(&shown, decibel, &mut noise);
         let found = one_mode(&applied, &measured, how);
-        // A gain of 1 at rest: K = 1.
+        // A static gain of 1: K = 1.
         let truth = [NATURAL.powi(-2), 2.0 * RATIO / NATURAL, 1.0];
         let found = found.modes[0].stand_constants().expect("a residue");
         for ((found, truth), coverage) in found.list.iter().zip(truth).zip(&mut covered) {
@@ -490,8 +494,8 @@ fn intervals_of_constants_cover_the_truth() {
     }
 }
 
-/// A hammer in N at an arm of 0.12 m and a bridge that gives 0.5 V per N m: 2 N m/V, written where the stand file says
-/// nothing of it, and left where weights have said it.
+/// A hammer in N at an arm of 0.12 m and a bridge that gives 0.5 V per N m: 2 N m/V, written if the stand file has no
+/// calibration, and not if weights have determined it.
 #[test]
 fn a_hammer_at_an_arm_gives_the_torque_of_a_volt() {
     let folder = Folder::new();
@@ -564,7 +568,7 @@ fn a_hammer_at_an_arm_gives_the_torque_of_a_volt() {
         ran.code == 0 && ran.stdout.contains(",2.0") | ran.stdout.contains(",1.9"),
         "{ran:?}"
     );
-    // The stand of the thesis has a calibration, which stays.
+    // The stand of the thesis has a calibration, which is kept.
     folder.write(
         "by-weights.toml",
         "schema = \"torqcomp.stand/1\"\n[calibration]\ntorque_per_volt = \"2.01 N m/V\"\n",
@@ -575,7 +579,7 @@ fn a_hammer_at_an_arm_gives_the_torque_of_a_volt() {
         stand.contains("\"2.01 N m/V\"") && stand.contains("natural_frequency"),
         "{stand}"
     );
-    // A radius makes a torque of a force only.
+    // A radius converts only a force to a torque.
     let mut wrong = args.to_vec();
     wrong[4] = "bridge";
     wrong[6] = "hammer";

@@ -1,4 +1,4 @@
-//! Run-ups: how often the intervals hold the truth. The records follow from closed forms.
+//! Run-ups: coverage of the intervals. The records follow from closed forms.
 
 use torqcomp::identify::{Motion, runup};
 
@@ -20,10 +20,10 @@ const BODY: Body = Body {
     offset: 0.15,
 };
 
-/// Sines that drive it: size in N m, angular frequency in rad/s, phase.
+/// Driving sines: amplitude in N m, angular frequency in rad/s, phase.
 type Drive = [(f64, f64, f64); 2];
 
-/// A stretch in which the body goes one way, or stands (way 0).
+/// An interval in which the body moves in one direction, or stops (way 0).
 #[derive(Clone, Copy)]
 struct Stretch {
     start: f64,
@@ -50,7 +50,7 @@ impl Body {
         })
     }
 
-    /// Speed and angle at a time of a stretch.
+    /// Speed and angle at a time within an interval.
     fn at(&self, drive: &Drive, s: &Stretch, t: f64) -> (f64, f64) {
         if s.way == 0.0 {
             return (0.0, s.angle);
@@ -82,7 +82,7 @@ impl Body {
         let mut before = 0.0;
         let mut angles = Vec::with_capacity(times.len());
         for t in times {
-            // Small steps to see a change of way, halved until the moment is exact.
+            // Small steps to detect a change of direction, halved until the moment is exact.
             while before < *t {
                 let to = (before + 1e-4).min(*t);
                 let over = |t: f64| match now.way {
@@ -117,7 +117,7 @@ impl Body {
     }
 }
 
-/// Angle and torque at 1 kHz for 4 s, noise on the torque so many decibels below it.
+/// Angle and torque at 1 kHz for 4 s, with noise on the torque `decibel` below it.
 fn record(decibel: f64, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
     let drive = [
         (3.0, TAU * 0.7, TAU * noise.uniform()),
@@ -145,7 +145,7 @@ fn turning<'a>(angles: &'a [f64], torques: &'a [f64]) -> runup::FreeRun<'a> {
 const NAMES: [&str; 4] = ["inertia", "viscous_friction", "dry_friction", "offset"];
 const TRUTH: [f64; 4] = [BODY.inertia, BODY.viscous, BODY.dry, BODY.offset];
 
-/// How many of so many runs hold the truth of each parameter.
+/// Coverage of each parameter over `runs` runs.
 fn coverage_at(decibel: f64, seed: u64, runs: usize) -> [Coverage; 4] {
     let mut noise = Noise(seed);
     let mut covered = [0; 4].map(|_| Coverage::default());
@@ -161,8 +161,8 @@ fn coverage_at(decibel: f64, seed: u64, runs: usize) -> [Coverage; 4] {
     covered
 }
 
-/// Each parameter at each level of noise: where the noise is least, a turn of the body that is placed a hundredth of
-/// a sample wrong would show.
+/// Each parameter at each noise level: at the lowest, a reversal located wrongly by a hundredth of a sample would
+/// show.
 #[test]
 fn intervals_of_run_ups_cover_the_truth() {
     let levels = [(20.0, 15), (40.0, 16), (60.0, 17)];
@@ -193,7 +193,8 @@ fn a_run_in_one_direction_does_not_invent_a_dry_friction() {
         body: runup::Body::Turning,
     };
     let found = runup::identify(&run, &runup::RunupOptions::default());
-    // Constant torque and an exponential speed satisfy θ'' + θ' = 50 throughout: only J/f follows.
+    // Constant torque and an exponential speed satisfy θ'' + θ' = 50 throughout: only J/f is
+    // identifiable.
     match found {
         Ok(found) => {
             assert!(

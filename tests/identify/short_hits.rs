@@ -1,4 +1,4 @@
-//! Uncertainties from one short hit, of a few samples, against a simulation in fine steps of its own.
+//! Uncertainties from one short hit of a few samples, against an independent fine-step simulation.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,7 +7,7 @@ use crate::util::Folder;
 
 const RATE_HZ: f64 = 5000.0;
 
-/// Half a sine of force, and the motion of a stand under it, by the classic Runge-Kutta method.
+/// A half-sine force, and the motion of a stand under it, by the classical Runge–Kutta method.
 fn hit(hz: f64, ratio: f64, pulse_s: f64, at_s: f64) -> Vec<(f64, f64)> {
     const STEPS: usize = 10;
     let omega = TAU * hz;

@@ -43,7 +43,7 @@ fn known_loads_give_the_calibration() {
     );
 }
 
-/// A zero far from nothing, as of 4 to 20 mA, changes the zero alone: readings to 1e-5 V with noise of 1e-4 V.
+/// A live zero, as of 4 to 20 mA, affects only the zero: readings to 1e-5 V with noise of 1e-4 V.
 #[test]
 fn a_zero_far_from_nothing_changes_no_uncertainty() {
     let noise = [13, 3, 2, -4, -2, -9, 11, 4, -6, 0, 7];
@@ -78,8 +78,8 @@ fn a_zero_far_from_nothing_changes_no_uncertainty() {
     }
 }
 
-/// Three series of eleven loads up and ten down; readings 0.02 V + 0.1 V/(N m) times the load, noise so
-/// many decibels below the largest, of one size or growing with the load (and then known).
+/// Three series of eleven loads up and ten down; readings 0.02 V + 0.1 V/(N m) times the load, with
+/// noise `decibel` below the largest, constant or growing with the load (and then known).
 fn points(decibel: f64, known: bool, noise: &mut Noise) -> Vec<Point> {
     let up = (0..=10).map(f64::from);
     let loads: Vec<f64> = (0..3)
@@ -135,7 +135,7 @@ fn intervals_of_known_loads_cover_the_truth() {
     }
 }
 
-/// Readings of a display with one decimal: 20.49 N m/(mV/V) reads as 20, and the last digit says how sure that is.
+/// Readings of a display with one decimal: 20.49 N m/(mV/V) reads as 20, and the last digit gives the uncertainty.
 #[test]
 fn the_last_digit_of_a_display_is_part_of_the_uncertainty() {
     let folder = Folder::new();
@@ -216,7 +216,7 @@ fn a_zero_that_drifts_is_said() {
     }
 }
 
-/// The square of such a reading is no number, nor is any residual.
+/// The square of such a reading overflows, and with it every residual.
 #[test]
 fn a_reading_beyond_all_instruments_is_refused() {
     let folder = Folder::new();
@@ -231,7 +231,7 @@ fn a_reading_beyond_all_instruments_is_refused() {
         .says(1, &["sample 2", "\"reading\"", "-1e308"]);
 }
 
-/// Loads of both signs, readings without: nothing follows anything, and no stand file comes of it.
+/// Loads of both signs, readings without sign: nothing correlates, and no stand file is written.
 #[test]
 fn readings_that_do_not_follow_the_load_are_refused() {
     let folder = Folder::new();
@@ -267,7 +267,7 @@ fn readings_that_do_not_follow_the_load_are_refused() {
     }
 }
 
-/// Loops of a data logger at every tenth of the load, read five times each: series, mountings and a hysteresis.
+/// Loops of a data logger at every tenth of the load, read five times each: series, mountings and hysteresis.
 fn logged(rows: usize, noise: &mut Noise) -> Vec<Point> {
     let point = |i: usize| {
         let series = i / 100;
@@ -303,13 +303,13 @@ fn time_grows_in_proportion_to_the_rows() {
         }
         start.elapsed().as_secs_f64()
     };
-    // The same number of rows for both, as other work on the machine then delays both alike.
+    // The same number of rows for both, so that other load on the machine affects both alike.
     let (small, large) = (seconds(&tables[0], 10), seconds(&tables[1], 1));
     println!("10 times 2,000 rows {small:.3} s, 20,000 rows {large:.3} s");
     assert!(large < 8.0 * small, "{small} s, {large} s");
 }
 
-/// Readings repeated at a load belong to the direction in which it was reached, and so does a load that scatters.
+/// Readings repeated at a load belong to the direction in which it was reached, as does a load that scatters.
 #[test]
 fn the_hysteresis_of_repeated_readings_is_found() {
     let units = LoadUnits {
@@ -323,7 +323,7 @@ fn the_hysteresis_of_repeated_readings_is_found() {
     }
     let found = identify(&points, 1, &units).unwrap();
     let hysteresis = found.terms.iter().find(|t| t.name == "hysteresis");
-    // At a tenth of the load: 2 · 0.01 · 0.1 · 0.9 V over 0.2 V; at the others less.
+    // At a tenth of the load: 2 · 0.01 · 0.1 · 0.9 V over 0.2 V; less at the others.
     let percent = hysteresis.unwrap().percent.unwrap();
     assert!((percent - 0.9).abs() < 0.4, "{percent} %");
 }

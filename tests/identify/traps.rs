@@ -1,4 +1,5 @@
-//! Records with a fault that a fit alone does not notice: the right number, or the fault by its name.
+//! Records with a fault that a fit alone does not reveal: either the right number, or the fault by
+//! its name.
 
 use serde_json::Value;
 
@@ -17,8 +18,8 @@ fn table(columns: [&str; 2], rows: impl Iterator<Item = (f64, f64)>) -> String {
 
 const RATE_HZ: f64 = 5000.0;
 
-/// Force of a hammer in N, and what a stand of 180 Hz with a damping ratio of 0.015 and 12.5 N m/V behind an arm of 0.12 m
-/// shows of it in V: hits of half a sine, the equation of motion by Runge and Kutta's method in 16 steps a sample.
+/// Force of a hammer in N, and the signal in V of a stand of 180 Hz with a damping ratio of 0.015 and 12.5 N m/V at an
+/// arm of 0.12 m: half-sine hits, the equation of motion by the Runge–Kutta method in 16 steps per sample.
 fn hits(hits: &[(f64, f64)], width_s: f64, count: usize) -> (Vec<f64>, Vec<f64>) {
     let force = |t: f64| {
         let of = |(at, size): &(f64, f64)| match t - at {
@@ -53,7 +54,7 @@ fn hits(hits: &[(f64, f64)], width_s: f64, count: usize) -> (Vec<f64>, Vec<f64>)
     (forces, shown)
 }
 
-/// Four hits at uneven distances.
+/// Four unevenly spaced hits.
 const HITS: [(f64, f64); 4] = [(0.11, 120.0), (1.13, 100.0), (2.24, 130.0), (3.21, 110.0)];
 const COUNT: usize = 21_000;
 
@@ -62,7 +63,7 @@ fn noisy(values: &[f64], size: f64, seed: u64) -> Vec<f64> {
     values.iter().map(|v| v + size * noise.normal()).collect()
 }
 
-/// A first-order high-pass, as AC coupling is, by its difference equation.
+/// A first-order high-pass, as for AC coupling, by its difference equation.
 fn coupled(values: &[f64], corner_hz: f64) -> Vec<f64> {
     let keep = 1.0 / (1.0 + TAU * corner_hz / RATE_HZ);
     let (mut last, mut out) = (values[0], 0.0);
@@ -96,7 +97,8 @@ fn near_truth(report: &Value, tolerance: f64) {
     assert_close(parameter(report, "damping_ratio").0, 0.015, 0.02);
 }
 
-/// The noise of the hammer between its hits is no force: with it, up to 14 % of the gain were missing.
+/// The noise of the hammer between its hits is not force: otherwise up to 14 % of the gain would be
+/// missing.
 #[test]
 fn noise_of_the_hammer_takes_nothing_off_the_gain() {
     let (force, shown) = hits(&HITS, 3e-3, COUNT);
@@ -117,7 +119,7 @@ fn noise_of_the_hammer_takes_nothing_off_the_gain() {
     }
 }
 
-/// Behind a capacitor, the force goes on after each stroke, and its noise stays in: that is said, with its size.
+/// With AC coupling, the force continues after each stroke, and its noise remains: reported with its magnitude.
 #[test]
 fn noise_of_a_coupled_hammer_is_said() {
     let (force, shown) = hits(&HITS, 3e-3, COUNT);
@@ -129,7 +131,7 @@ fn noise_of_a_coupled_hammer_is_said() {
     assert!(!codes(&quiet).contains(&"noise-on-force"), "{quiet}");
     let noisy = behind(1.2);
     has(&noisy, "noise-on-force");
-    // N σ²/S²: 5000 samples of 1.2 N, and 15 samples of half a sine of 115 N, which add up to 1100 N.
+    // N σ²/S²: 5000 samples of 1.2 N, and 15 samples of a half-sine of 115 N, which sum to 1100 N.
     let found = parameter(&noisy, "torque_per_volt").0 / parameter(&quiet, "torque_per_volt").0;
     let said = noisy["warnings"].to_string();
     let percent = said
@@ -152,7 +154,8 @@ fn hum_on_the_bridge_is_no_mode() {
         let (report, stand) = evaluated(&noisy(&force, 0.02, 3), &noisy(&shown, 2e-4, 4));
         // 15 samples of a pulse alias by 0.36 %.
         near_truth(&report, 6e-3);
-        // Smaller ones are not always told from the answers to the hits: they are noise then.
+        // Smaller ones cannot always be separated from the responses to the hits, and are noise
+        // then.
         if size > 2e-2 {
             has(&report, "mains-taken-off");
         }
@@ -226,7 +229,7 @@ fn pulses_of_few_samples_are_named() {
     has(&report, "short-pulse");
 }
 
-/// Free ringing of 180 Hz from several hits: at, and size.
+/// Free decay of 180 Hz from several hits: time and amplitude.
 fn ringing(hits: &[(f64, f64)], ratio: f64, count: usize, seed: u64) -> Vec<f64> {
     let omega = TAU * 180.0;
     let damped = omega * (1.0 - ratio * ratio).sqrt();
@@ -278,7 +281,7 @@ fn a_second_hit_within_a_decay_is_named() {
             let report = decayed(&[ringing(&[(0.2, 1.0), (at, size)], ratio, 10_000, 9)]);
             rings_right(&report, ratio);
             let all = codes(&report);
-            // A rise beyond the swing is the start of another decay, as ever.
+            // A rise above the previous amplitude is the start of another decay, as usual.
             let is_named = all.contains(&"restart-in-decay");
             assert!(
                 is_named || size.abs() > 0.5 || ratio > 0.02,
@@ -330,7 +333,7 @@ fn decays_of_two_stands_are_named() {
     assert!(!codes(&alike).contains(&"decays-apart"), "{alike}");
 }
 
-/// An amplifier that is AC coupled at 20 Hz, and a step that the hit leaves.
+/// An amplifier with 20 Hz AC coupling, and a step left by the hit.
 #[test]
 fn what_falls_with_the_ringing_is_no_noise() {
     let whole = ringing(&[(0.2, 1.0)], 0.015, 10_000, 9);
@@ -403,7 +406,7 @@ fn a_zero_that_walks_is_not_known_better_than_it_is_read() {
         let report = loaded(&rows, ["load_Nm", "bridge_V"]);
         let (zero, std, _) = parameter(&report, "zero");
         let std = std.expect("a std");
-        // A reading alone has 2e-4 V, and there are 22.
+        // A single reading has 2e-4 V, and there are 22.
         assert!(std > 4e-5, "{seed}: {std}");
         inside += usize::from((zero - 0.05).abs() < 1.96 * std);
     }
@@ -573,7 +576,7 @@ fn a_gage_factor_of_no_gage_is_asked() {
     assert!(!drawing("2.05") && !drawing("157"));
 }
 
-/// A period of no sample divides nothing, one of a single sample holds no line.
+/// A period of zero samples must not divide, one of a single sample has no line.
 #[test]
 fn a_period_without_lines_is_refused() {
     let (force, shown) = hits(&[(0.1, 100.0), (1.1, 100.0)], 0.002, 10_000);
@@ -590,7 +593,7 @@ fn a_period_without_lines_is_refused() {
     }
 }
 
-/// A low-pass of second order that overshoots, by its difference equation.
+/// A second-order low-pass with overshoot, by its difference equation.
 fn filtered(values: &[f64], corner_hz: f64) -> Vec<f64> {
     let (ratio, turn) = (0.38_f64, TAU * corner_hz / RATE_HZ);
     let radius = (-ratio * turn).exp();
@@ -607,7 +610,7 @@ fn filtered(values: &[f64], corner_hz: f64) -> Vec<f64> {
     values.iter().map(step).collect()
 }
 
-/// An oscilloscope of 8 bits, an amplifier that settles, and a filter before the converter: nothing of it is the stand's.
+/// An 8-bit oscilloscope, a settling amplifier, and a filter before the converter: none of it belongs to the stand.
 #[test]
 fn what_recorders_add_to_a_decay_is_no_mode() {
     let whole = ringing(&[(0.2, 1.0)], 0.015, 10_000, 9);
@@ -641,7 +644,7 @@ fn gram_for_an_acceleration_is_asked() {
         .says(0, &[]);
 }
 
-/// Stamps in whole milliseconds, five to a sample or four to five, are those of the recorder's grid.
+/// Stamps in whole milliseconds, five per sample or four to five, are on the recorder's grid.
 #[test]
 fn rounded_stamps_of_a_decay_are_uniform() {
     let values = ringing(&[(0.1, 1.0)], 0.015, 12_000, 7);
@@ -661,8 +664,8 @@ fn rounded_stamps_of_a_decay_are_uniform() {
     assert!(!codes(&report).contains(&"time-jitter"), "{report}");
 }
 
-/// Samples at even times whose stamps say when they arrived, up to more than a step late, are told from samples that were taken
-/// when their stamps say.
+/// Uniform samples whose stamps are arrival times, up to more than a step late, are distinguished from samples taken at
+/// the times of their stamps.
 #[test]
 fn stamps_of_arrival_are_told_by_the_decay() {
     let even = ringing(&[(0.1, 1.0)], 0.015, 12_000, 7);
@@ -701,8 +704,8 @@ fn stamps_of_arrival_are_told_by_the_decay() {
     }
 }
 
-/// A channel that is one or two samples late turns the resonance, which without a delay made the static gain 1 and 14 % wrong. The
-/// excitation is of tones beside all lines of the record, and so is its exact answer.
+/// A channel that is one or two samples late turns the resonance, which without a delay biased the static gain by 1 and
+/// 14 %. The excitation consists of tones off the lines of the record, and so does its exact response.
 #[test]
 fn a_channel_that_is_samples_late_leaves_the_gain_right() {
     const COUNT: usize = 12_000;
@@ -754,7 +757,8 @@ fn a_channel_that_is_samples_late_leaves_the_gain_right() {
     }
 }
 
-/// A step has most of its power far below the resonance that it excites. The answer to its ramp is in closed form.
+/// A step has most of its power far below the resonance that it excites. The response to its ramp is in closed
+/// form.
 #[test]
 fn one_step_shows_its_resonance() {
     const GAIN: f64 = 0.08;
@@ -812,7 +816,7 @@ fn one_step_shows_its_resonance() {
     }
 }
 
-/// Noise of a tenth of the swing behind a decay that is over soon is no doubt about the decay.
+/// Noise of a tenth of the amplitude after a short decay does not make the decay doubtful.
 #[test]
 fn a_quiet_tail_makes_no_poor_fit() {
     let noise = |seed| {

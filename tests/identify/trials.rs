@@ -1,5 +1,5 @@
-//! Trials of the stated uncertainties where the noise is not white, the input is noisy, mountings differ, the zero drifts
-//! or the stand has hysteresis. Short by default; `TORQCOMP_TRIALS=400` sets the number of records of each case.
+//! Trials of the stated uncertainties with coloured noise, a noisy input, differing mountings, zero drift or hysteresis
+//! of the stand. Short by default; `TORQCOMP_TRIALS=400` sets the number of records per case.
 
 use torqcomp::identify::static_load::{LoadUnits, Point, series_of};
 use torqcomp::identify::{decay, response, static_load};
@@ -8,8 +8,8 @@ use super::response::{driven, driven_by};
 use super::{Coverage, Noise, TAU, of, times};
 use crate::util::{assert_close, trials};
 
-/// Between 92 and 97 % of the intervals include the true value, give or take three standard deviations of that share over
-/// so many records.
+/// Between 92 and 97 % of the intervals cover the true value, within three standard deviations of that fraction for the
+/// number of records.
 fn check(covered: &Coverage, what: &str) {
     let all = covered.all as f64;
     let share = covered.inside as f64 / all;
@@ -28,24 +28,24 @@ fn check(covered: &Coverage, what: &str) {
     );
 }
 
-/// Colours of noise.
+/// Noise colours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Colour {
     White,
     /// First order: x_i = a x_(i−1) + e_i.
     FirstOrder(f64),
-    /// Two poles on the real axis, as of a low-pass.
+    /// Two real poles, as of a low-pass.
     LowPassed(f64),
     /// Eight first-order noises of equal power, time constants of 2 to 2⁸ samples.
     Pink,
-    /// A pole pair: frequency in cycles a sample, damping per sample.
+    /// A pole pair: frequency in cycles per sample, damping per sample.
     Resonant(f64, f64),
-    /// The pole pair of the stand, as of another torque on it.
+    /// The pole pair of the stand, as from another torque on it.
     OfStand,
 }
 
 impl Colour {
-    /// So many samples with a standard deviation of about 1, on a stand with that pole pair.
+    /// `count` samples with a standard deviation of about 1, on a stand with that pole pair.
     fn samples(self, count: usize, of_stand: (f64, f64), noise: &mut Noise) -> Vec<f64> {
         let settle = 4000;
         let mut first_order = |a: f64| -> Vec<f64> {
@@ -96,8 +96,8 @@ impl Colour {
     }
 }
 
-/// Decays of the stand of figure 5 (590 Hz) and of a lightly damped one in noise of a colour, 20 to 50 dB below the first
-/// amplitude.
+/// Decays of the stand of figure 5 (590 Hz) and of a lightly damped one in coloured noise, 20 to 50 dB below the
+/// initial amplitude.
 fn decays(colour: Colour, count: usize) -> ([Coverage; 2], usize) {
     let mut noise = Noise(41);
     let mut covered = [Coverage::default(), Coverage::default()];
@@ -174,7 +174,7 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// Where the noise of a response comes from.
+/// Origin of the noise of a response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Disturbance {
     /// White, in the measured signal.
@@ -297,7 +297,7 @@ fn transients_are_taken_as_they_are() {
     }
 }
 
-/// A band with too many lines is answered with one that will do.
+/// A band with too many lines is rejected with a suggestion that works.
 #[test]
 fn a_band_with_few_enough_lines_is_suggested() {
     let bell = |t: f64| (-0.5 * ((t - 0.2) / 0.0005).powi(2)).exp();
@@ -326,23 +326,23 @@ fn a_band_with_few_enough_lines_is_suggested() {
     assert_close(of(&found, "natural_frequency").value(), 60.0, 1e-3);
 }
 
-/// What disturbs a calibration besides white noise of the readings.
+/// Disturbances of a calibration besides white noise of the readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Calibration {
     Plain,
-    /// Each mounting has a sensitivity and a zero of its own; so many of them.
+    /// Each mounting has its own sensitivity and zero; number of mountings.
     Mountings(usize),
-    /// The mountings are declared, but all the same.
+    /// Declared mountings without differences.
     SameMountings,
-    /// The zero walks at random.
+    /// The zero follows a random walk.
     Walk,
-    /// The zero drifts evenly.
+    /// The zero drifts linearly.
     EvenDrift,
     /// Half an ellipse of hysteresis, closed at both ends.
     Hysteresis,
     /// A constant hysteresis.
     Friction,
-    /// Loading only, and a zero that walks at random.
+    /// Loading only, with a random walk of the zero.
     WalkUp,
 }
 

@@ -1,4 +1,4 @@
-//! `diagnose` on recordings made by others: which effect is named, and what is said where none can be.
+//! `diagnose` on third-party recordings: which effect is named, and the report if none can be.
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::{check, rows};
 
-/// A folder with pieces of recordings, and the program run in it.
+/// A folder with pieces of recordings, in which the program runs.
 struct Bench {
     folder: tempfile::TempDir,
 }
@@ -21,7 +21,7 @@ impl Bench {
         })
     }
 
-    /// Writes the rows of a table in a range, its heading above them.
+    /// Writes the rows of a table in a range, below its heading.
     fn cut(&self, from: &Path, range: std::ops::Range<usize>, name: &str) -> Result<(), Failed> {
         let text = std::fs::read_to_string(from)?;
         let mut lines = text.lines();
@@ -46,7 +46,7 @@ impl Bench {
         ))
     }
 
-    /// The error of the refined stand's answer to a force, over the rms of what it should be.
+    /// Error of the refined stand's response to a force, relative to the RMS of the reference.
     fn answered(&self, rows: &[[f64; 2]], options: &[&str]) -> Result<f64, Failed> {
         let mut text = String::from("time_s,force_in_N\n");
         for (i, [force, _]) in rows.iter().enumerate() {
@@ -98,7 +98,8 @@ fn held_out(report: &Value, which: &str, unit: &str) -> f64 {
     error.as_f64().unwrap_or(f64::NAN)
 }
 
-/// The cubic spring of the circuit explains nearly all of 7 mV. What it leaves is named in part, and no cause of all of it.
+/// The cubic spring of the circuit explains nearly all of 7 mV. The remainder is named in part, without a cause for all
+/// of it.
 pub fn silverbox(folder: &Path) -> Result<(), Failed> {
     let file = folder.join("silverbox/estimation.csv");
     let bench = Bench::new()?;
@@ -119,7 +120,7 @@ pub fn silverbox(folder: &Path) -> Result<(), Failed> {
         format!("{before} {after}"),
     )?;
 
-    // The refined stand on its own, on what it has not seen.
+    // The refined stand alone, on unseen data.
     let (code, out, err) = bench.run(&[
         "simulate",
         "holdout.csv",
@@ -146,7 +147,7 @@ pub fn silverbox(folder: &Path) -> Result<(), Failed> {
         format!("{settled} V are left of the record"),
     )?;
 
-    // A period of odd lines only, after the gap before it: what its halves have in common does not follow from it.
+    // A period of odd lines only, after the gap before it: the common part of its halves does not follow from it.
     let (first, second) = left[570..570 + 8192].split_at(4096);
     let halves = |sign: f64| -> Vec<f64> {
         let pairs = first.iter().zip(second);
@@ -157,7 +158,7 @@ pub fn silverbox(folder: &Path) -> Result<(), Failed> {
     check(is_mostly_noise, format!("{noise} V, {both} V"))
 }
 
-/// Hysteresis, named; the stand that comes out answers inputs that it was not fitted to as the published equations do.
+/// Hysteresis is named; the resulting stand responds to unseen inputs like the published equations.
 pub fn bouc_wen(folder: &Path) -> Result<(), Failed> {
     let file = folder.join("boucwen/estimation.csv");
     let bench = Bench::new()?;
@@ -171,7 +172,8 @@ pub fn bouc_wen(folder: &Path) -> Result<(), Failed> {
     let [before, after] = ["before", "after"].map(|w| held_out(&report, w, "relative"));
     check(before > 0.2 && after < 0.012, format!("{before} {after}"))?;
 
-    // A sweep through the resonance from rest, and a period of the steady answer to ten lines; without noise.
+    // A sweep through the resonance from rest, and a period of the steady-state response to ten lines;
+    // without noise.
     let sweep = bouc_wen_answer(30_000, |t| 40.0 * (TAU * (20.0 + 0.375 * t) * t).sin());
     let error = bench.answered(&sweep, &[])?;
     check(error < 1.5e-3, format!("sweep: {error}"))?;
@@ -184,9 +186,9 @@ pub fn bouc_wen(folder: &Path) -> Result<(), Failed> {
     check(error < 1.5e-3, format!("steady lines: {error}"))
 }
 
-/// What acts and the displacement at 750 Hz, from rest, of `2 y'' + 10 y' + 5e4 y + z = u`,
-/// `z' = 5e4 y' − 1e3 (0.8 |y'| z − 1.1 y' |z|)`, by Newmark's rule of constant mean acceleration at 15 kHz: J. P. Noel,
-/// M. Schoukens, *Hysteretic benchmark with a dynamic nonlinearity* (2016).
+/// Force and displacement at 750 Hz, from rest, of `2 y'' + 10 y' + 5e4 y + z = u`,
+/// `z' = 5e4 y' − 1e3 (0.8 |y'| z − 1.1 y' |z|)`, by Newmark's method with constant mean acceleration at 15 kHz: J. P.
+/// Noel, M. Schoukens, *Hysteretic benchmark with a dynamic nonlinearity* (2016).
 fn bouc_wen_answer(count: u32, input: impl Fn(f64) -> f64) -> Vec<[f64; 2]> {
     const STEPS: u32 = 20;
     let h = 1.0 / (750.0 * f64::from(STEPS));
@@ -214,7 +216,7 @@ fn bouc_wen_answer(count: u32, input: impl Fn(f64) -> f64) -> Vec<[f64; 2]> {
     rows
 }
 
-/// The error depends on the level, and no effect of the list explains it all.
+/// The error depends on the level, and no listed effect explains it all.
 pub fn f16(folder: &Path) -> Result<(), Failed> {
     let bench = Bench::new()?;
     for (level, name) in [(1, "train.csv"), (3, "holdout.csv")] {
@@ -232,8 +234,8 @@ pub fn f16(folder: &Path) -> Result<(), Failed> {
     f16_with_modes(folder, &bench)
 }
 
-/// Six modes of the lower level, as they are at the higher one: what changes there is no effect of the chain, and those in the
-/// joint do not show in an acceleration elsewhere.
+/// Six modes of the lower level, as they are at the higher one: what changes there is not an effect of the chain, and
+/// effects in the joint do not show in an acceleration elsewhere.
 fn f16_with_modes(folder: &Path, bench: &Bench) -> Result<(), Failed> {
     let file = folder.join("f16/multisine_level1.csv");
     let columns = ["--applied", "force_N", "--measured", "accel_payload"];
@@ -265,7 +267,7 @@ fn f16_with_modes(folder: &Path, bench: &Bench) -> Result<(), Failed> {
     check(train < 0.045 && there < 0.6, format!("{train} {there}"))
 }
 
-/// No spring: mass and dry friction as published, and the force of motions that were not fitted to 4 %.
+/// No spring: mass and dry friction as published, and the force of unseen motions to 4 %.
 pub fn emps(folder: &Path) -> Result<(), Failed> {
     let file = folder.join("emps/estimation.csv");
     let bench = Bench::new()?;
@@ -289,7 +291,7 @@ pub fn emps(folder: &Path) -> Result<(), Failed> {
     check(is_near, format!("{found:?}"))
 }
 
-/// Channels the wrong way round.
+/// Swapped channels.
 pub fn swapped(folder: &Path) -> Result<(), Failed> {
     let file = folder.join("silverbox/estimation.csv");
     let bench = Bench::new()?;
@@ -300,7 +302,7 @@ pub fn swapped(folder: &Path) -> Result<(), Failed> {
     check(code == 1 && err.contains("look swapped"), out + &err)
 }
 
-/// One turn a second: order 60 and the grid coincide.
+/// One turn per second: order 60 and the grid coincide.
 pub fn order_or_mains(folder: &Path) -> Result<(), Failed> {
     let file = folder.join("torque_transducer/generating__60rpm-torque__ILC-OFF_0pc-load.txt");
     let path = file.to_str().unwrap_or_default();

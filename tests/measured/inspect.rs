@@ -1,4 +1,4 @@
-//! What `inspect` finds in recordings made by others, against what is counted here.
+//! Findings of `inspect` in third-party recordings, against counts made here.
 
 use std::path::Path;
 use std::process::Command;
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::check;
 
-/// A test: its name and what it does with the folder of the recordings.
+/// A test: its name and function of the folder of the recordings.
 pub type Test = (&'static str, fn(&Path) -> Result<(), Failed>);
 
 pub const TESTS: [Test; 6] = [
@@ -38,7 +38,7 @@ fn codes(report: &Value) -> Vec<String> {
     warnings.iter().map(code).collect()
 }
 
-/// Cells of a column, as text, of the lines in which it is a number.
+/// Cells of a column, as text, from the lines in which it is a number.
 fn column(path: &Path, separator: char, place: usize) -> Result<Vec<String>, Failed> {
     let text = String::from_utf8_lossy(&std::fs::read(path)?).into_owned();
     let cell = |line: &str| -> Option<String> {
@@ -53,7 +53,7 @@ fn numbers(cells: &[String]) -> Vec<f64> {
     cells.iter().map(number).collect()
 }
 
-/// Benchmarks that have been used by many: nothing but the mains of the laboratory is wrong with them.
+/// Widely used benchmarks: their only fault is mains hum of the laboratory.
 fn good(folder: &Path) -> Result<(), Failed> {
     for file in [
         "silverbox/estimation.csv",
@@ -71,7 +71,7 @@ fn good(folder: &Path) -> Result<(), Failed> {
             format!("{file}: {report}"),
         )?;
     }
-    // The lines at 50, 100 and 150 Hz of the shaker's force are seen at both levels; none elsewhere.
+    // The lines at 50, 100 and 150 Hz of the shaker's force appear at both levels; none elsewhere.
     let quiet = ["silverbox/estimation.csv", "emps/estimation.csv"];
     for file in quiet {
         check(codes(&inspect(folder, &[file])?).is_empty(), file)?;
@@ -89,7 +89,7 @@ fn good(folder: &Path) -> Result<(), Failed> {
     )
 }
 
-/// Samples whose text is that of the one before.
+/// Number of samples whose text equals the previous one.
 fn repeated(folder: &Path) -> Result<(), Failed> {
     let mut seen = 0;
     for entry in std::fs::read_dir(folder.join("torque_transducer"))? {
@@ -115,7 +115,7 @@ fn repeated(folder: &Path) -> Result<(), Failed> {
     check(seen == 5, format!("{seen} files"))
 }
 
-/// Steps between stamps that are longer than one and a half of the usual one.
+/// Number of steps between stamps longer than 1.5 times the typical one.
 fn gaps(folder: &Path) -> Result<(), Failed> {
     for file in [
         "thrust_balance/1.caldata_m4_l5_F9_725.txt",
@@ -145,7 +145,7 @@ fn gaps(folder: &Path) -> Result<(), Failed> {
     Ok(())
 }
 
-/// Two pairs of the files are one under two names, and one file has channels that are multiples.
+/// Two pairs of files are identical, and one file has channels that are multiples.
 fn copies(folder: &Path) -> Result<(), Failed> {
     let transducer = "torque_transducer/generating__60rpm-torque__ILC-OFF_10pc-load.txt";
     for pair in [
@@ -161,7 +161,7 @@ fn copies(folder: &Path) -> Result<(), Failed> {
         check(found == ["identical-files"], format!("{pair:?}: {found:?}"))?;
     }
     let file = "dialects/phyprakit_Cassy.txt";
-    // The lines of the head hold numbers as well, but for their first cells.
+    // The header lines contain numbers as well, except for their first cells.
     let samples = column(&folder.join(file), '\t', 0)?.len();
     let last = |place: usize| -> Result<Vec<f64>, Failed> {
         let cells = column(&folder.join(file), '\t', place)?;
@@ -204,7 +204,7 @@ fn resolution(folder: &Path) -> Result<(), Failed> {
     check(seen == 2, report)
 }
 
-/// A droop counter of 16 bits at its end, and an oscilloscope that stores every value twice.
+/// A 16-bit droop counter at its limit, and an oscilloscope that stores every value twice.
 fn saturated(folder: &Path) -> Result<(), Failed> {
     let file = "dialects/mitsubishi_MRconfigurator.csv";
     let droop = numbers(&column(&folder.join(file), ',', 3)?);

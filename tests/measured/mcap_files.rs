@@ -1,4 +1,4 @@
-//! MCAP files written by others. The expected values were read with the Python packages
+//! Third-party MCAP files. The expected values were read with the Python packages
 //! `mcap-ros2-support` and `mcap-ros1-support`.
 
 use std::path::Path;
@@ -113,7 +113,7 @@ pub fn open_chunk(folder: &Path) -> Result<(), Failed> {
     check(warning.message.contains("byte 39"), &warning.message)
 }
 
-/// A copy holds everything, and the torque besides.
+/// A copy contains everything, and the torque in addition.
 pub fn copied(folder: &Path) -> Result<(), Failed> {
     use torqcomp::io::mcap::decode::Encoding;
     use torqcomp::io::mcap::writer::Added;
@@ -158,7 +158,7 @@ pub fn copied(folder: &Path) -> Result<(), Failed> {
     Ok(())
 }
 
-/// Log and publish time where they are asked for.
+/// Log and publish time, if requested.
 pub fn times(folder: &Path) -> Result<(), Failed> {
     let name = "rosbags_rs_test_bag.mcap";
     let selection = FieldChoice {

@@ -1,4 +1,4 @@
-//! Several modes of recordings made by others, written into a stand file and simulated from it.
+//! Several modes of third-party recordings, written to a stand file and simulated from it.
 
 use std::ops::Range;
 use std::path::Path;
@@ -39,7 +39,7 @@ impl Bench {
     }
 }
 
-/// Relative difference of a simulated record from the measured one, over lines of their spectra.
+/// Relative difference between a simulated and the measured record, over lines of their spectra.
 fn apart(simulated: &[f64], block: &Block, window: Window, lines: Range<usize>) -> f64 {
     let spectrum = frf::transform(simulated, simulated, window).measured;
     let ratio = |k: usize| spectrum[k] / block.applied[k];
@@ -47,7 +47,7 @@ fn apart(simulated: &[f64], block: &Block, window: Window, lines: Range<usize>) 
     frf::prediction_error(&response, block, lines)
 }
 
-/// Force and acceleration of a hit, without the level before it.
+/// Force and acceleration of a hit, without the preceding level.
 fn hit(file: &Path) -> Result<[Vec<f64>; 2], Failed> {
     let text = std::fs::read_to_string(file)?;
     let table = text.rsplit("X_Value").next().unwrap_or_default();
@@ -65,7 +65,7 @@ fn hit(file: &Path) -> Result<[Vec<f64>; 2], Failed> {
     Ok(both)
 }
 
-/// The third hit from the modes of two others, 60 to 1000 Hz, under the exponential window to 1 % that is usual for hits.
+/// The third hit from the modes of two others, 60 to 1000 Hz, with the usual exponential window to 1 %.
 pub fn hammer(folder: &Path) -> Result<(), Failed> {
     let bench = Bench {
         folder: tempfile::tempdir()?,
@@ -91,8 +91,8 @@ pub fn hammer(folder: &Path) -> Result<(), Failed> {
     Ok(())
 }
 
-/// The modes of one level at that level and at the other: the last of three periods, 2 to 15 Hz, beside the response itself of
-/// that level, the best that a linear model of it does at the other.
+/// The modes of one level at that level and at the other: the last of three periods, 2 to 15 Hz, compared with the
+/// response of that level itself, the best possible linear model at the other.
 pub fn f16(folder: &Path) -> Result<(), Failed> {
     const PERIOD: usize = 8192;
     let bench = Bench {

@@ -1,4 +1,4 @@
-//! Every recording is read with the channels, units, rates and samples that `expected.tsv` has.
+//! Every recording is read with the channels, units, rates and samples of `expected.tsv`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::check;
 
 const EXPECTED: &str = include_str!("expected.tsv");
 
-/// Largest difference of a rate that is told from stamps with jitter, as a fraction.
+/// Largest relative difference of a rate determined from stamps with jitter.
 const RATE: f64 = 2e-4;
 
 /// A line of the list, without path and dialect.
@@ -47,7 +47,7 @@ fn read(folder: &Path, path: &str) -> Result<Recording, Failed> {
     recording::read(&place, &Options::default()).map_err(|failure| failure.to_string().into())
 }
 
-/// All files but the one with segments and the one that is none.
+/// All files except the one with segments and the non-recording.
 pub fn all(folder: &Path) -> Result<(), Failed> {
     let files = expected();
     check(files.len() == 35, files.len())?;
@@ -115,7 +115,7 @@ pub fn segments(folder: &Path) -> Result<(), Failed> {
     check(rates && found.lost.is_none(), "rates")
 }
 
-/// A list of settings is no recording.
+/// A list of settings is not a recording.
 pub fn settings(folder: &Path) -> Result<(), Failed> {
     let place = Input::File(folder.join("dialects/precision_filters_settings.csv"));
     match recording::read(&place, &Options::default()) {
@@ -124,7 +124,7 @@ pub fn settings(folder: &Path) -> Result<(), Failed> {
     }
 }
 
-/// What had to be assumed is said, and what was certain is not.
+/// Assumptions are reported, certain facts are not.
 pub fn assumptions(folder: &Path) -> Result<(), Failed> {
     for (path, is_assumed) in [
         ("thrust_balance/data1.txt", true),

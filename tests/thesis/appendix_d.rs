@@ -1,13 +1,13 @@
-//! Appendix D, every row: the inverse transfer function as the thesis tabulates it.
+//! Appendix D, every row: the inverse transfer function as tabulated in the thesis.
 //!
-//! The table was computed in the single precision of its machine: six hexadecimal digits (a
-//! spacing of up to 16⁻⁵ = 9.54e-7 of a number), cut off and not rounded after every operation.
-//! In G = (K − Jω² + jωf)/K the difference K − Jω² loses digits, so an error of two spacings of
-//! each of K and Jω² is an error of 2·16⁻⁵ (1 + Jω²/K) in G. That is the budget of a row. The last
-//! test does the arithmetic of that machine and lands on the printed digits themselves.
+//! The table was computed in the single precision of its machine: six hexadecimal digits (a spacing
+//! of up to 16⁻⁵ = 9.54e-7 of a number), truncated rather than rounded after every operation. In G
+//! = (K − Jω² + jωf)/K the difference K − Jω² loses digits, so an error of two spacings of each of
+//! K and Jω² is an error of 2·16⁻⁵ (1 + Jω²/K) in G. That is the error budget of a row. The last
+//! test emulates the arithmetic of that machine and reproduces the printed digits themselves.
 //!
-//! The row at 710 Hz is garbled in the source, which shows 0.468884745 with one 8 doubled; the
-//! data file has 0.46884745 and says so in its last column.
+//! The row at 710 Hz is garbled in the source, which shows 0.468884745 with one 8 doubled; the data
+//! file has 0.46884745 and says so in its last column.
 
 use std::f64::consts::TAU;
 
@@ -94,7 +94,7 @@ fn every_row_follows_within_the_precision_of_its_machine() {
         worst_phase = worst_phase.max(turn.abs());
     }
     println!("worst: {worst_magnitude:.3e} of the magnitude, {worst_phase:.3e}°");
-    // Worst rows: 640 Hz in magnitude, where the digits lost are not made up for by f, and 580 Hz
+    // Worst rows: 640 Hz in magnitude, where f does not compensate for the lost digits, and 580 Hz
     // in phase, next to the resonance.
     assert!(worst_magnitude < 5.3e-6, "{worst_magnitude:e}");
     assert!(worst_phase < 5e-4, "{worst_phase:e}");
@@ -102,14 +102,14 @@ fn every_row_follows_within_the_precision_of_its_machine() {
 
 #[test]
 fn the_garbled_row_fails_as_the_source_shows_it() {
-    // Shows that the check above can tell: 0.468884745 is off by 8e-5.
+    // Shows the sensitivity of the check above: 0.468884745 is off by 8e-5.
     let stand = SecondOrder::new(INERTIA, DAMPING, STIFFNESS).unwrap();
     let magnitude = stand.inverse(710.0).norm();
     assert!((0.468_884_745 - magnitude).abs() > 10.0 * SPACING * 2.5);
     assert!((0.468_847_45 - magnitude).abs() < SPACING * 2.5);
 }
 
-/// Cuts a number to so many hexadecimal digits, counted from its first one.
+/// Truncates a number to so many hexadecimal digits, counted from its first one.
 fn cut(x: f64, digits: i32) -> f64 {
     if x == 0.0 {
         return 0.0;
@@ -124,7 +124,7 @@ fn cut(x: f64, digits: i32) -> f64 {
     cut_at(x, digits - exponent)
 }
 
-/// Cuts a number behind so many hexadecimal places.
+/// Truncates a number after so many hexadecimal places.
 fn cut_at(x: f64, places: i32) -> f64 {
     let scale = 16_f64.powi(places);
     (x * scale).trunc() / scale
@@ -141,8 +141,8 @@ fn minus(a: f64, b: f64) -> f64 {
 
 #[test]
 fn arithmetic_of_the_machine_gives_the_printed_digits() {
-    // A = J (2π)² and B = f 2π as the program forms them. Its A came out one unit in the last
-    // digit below the exact product cut off; with that, the rows follow.
+    // A = J (2π)² and B = f 2π as the program forms them. Its A was one unit in the last digit
+    // below the truncated exact product; with that, the rows follow.
     let product = |a: f64, b: f64| cut(a * b, 6);
     let a = cut(INERTIA * TAU * TAU, 6) - 16_f64.powi(-6);
     let b = cut(DAMPING * TAU, 6);

@@ -1,20 +1,21 @@
-//! A printed number beside what follows from the inputs printed next to it, and the units of the thesis.
+//! A printed number compared with the result of the inputs printed next to it, and the units of the
+//! thesis.
 
 use torqcomp_model::{Kind, SecondOrder, UnitSystem};
 
-/// A printed value, half a unit of its last digit, and what the inputs beside it give.
+/// A printed value, half a unit of its last digit, and the result of its inputs.
 pub struct Comparison {
     equation: &'static str,
     printed: f64,
     half_digit: f64,
-    /// Value worked by hand, and half a unit of its last digit.
+    /// Value computed by hand, and half a unit of its last digit.
     by_hand: f64,
     by_hand_half_digit: f64,
     recomputed: f64,
 }
 
 impl Comparison {
-    /// Prints the comparison and checks the crate against the value worked by hand.
+    /// Prints the comparison and checks the crate against the value computed by hand.
     #[track_caller]
     fn show(&self) -> f64 {
         let difference = self.recomputed - self.printed;
@@ -37,7 +38,7 @@ impl Comparison {
         difference.abs()
     }
 
-    /// The printed value is the recomputed one, rounded.
+    /// The printed value is the rounded recomputed one.
     #[track_caller]
     pub fn follows(self) {
         let difference = self.show();
@@ -48,7 +49,7 @@ impl Comparison {
         );
     }
 
-    /// The printed value is not the recomputed one, rounded.
+    /// The printed value is not the rounded recomputed one.
     #[track_caller]
     pub fn differs(self) {
         let difference = self.show();

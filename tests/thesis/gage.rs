@@ -1,7 +1,7 @@
 //! The gage, bridge and conversion against the numbers of the thesis.
 //!
-//! `tests/data/thesis/appendix_b.csv` is the BLH strain sensitivity table of Appendix B.
-//! Each check prints what the thesis prints, what follows, and the difference.
+//! `tests/data/thesis/appendix_b.csv` is the BLH strain sensitivity table of Appendix B. Each check
+//! prints the value of the thesis, the computed one, and the difference.
 
 use proptest::prelude::*;
 use torqcomp_dsp::bridge::{ArmLaw, Bridge, BridgeLayout, Supply};
@@ -98,14 +98,14 @@ fn clean_cells_invert_to_their_strain() {
     for cell in table().iter().filter(|c| !c.suspect) {
         let temperature_k = kelvin_from_fahrenheit(f64::from(cell.temperature_f));
         let strain = table_gage().strain(cell.change, temperature_k).unwrap();
-        // 3e-4 over the least slope of the table, about 125 per unit strain.
+        // 3e-4 over the smallest slope of the table, about 125 per unit strain.
         assert!((strain * 1e6 - f64::from(cell.microstrain)).abs() < 2.4);
     }
 }
 
-/// The 120 °F column from -1400 to -1050 repeats the 100 °F column one row
-/// further on; the page prints an eighth column that holds the right numbers
-/// one row early. The cell at -1400 is wrong too, but by less than 3e-4.
+/// The 120 °F column from -1400 to -1050 repeats the 100 °F column one row further on; the page
+/// prints an eighth column with the right numbers one row early. The cell at -1400 is wrong too,
+/// but by less than 3e-4.
 #[test]
 fn suspect_run_is_a_slip_of_one_column_and_one_row() {
     let cells = table();
@@ -142,7 +142,7 @@ fn b1_unit_change_and_prestrain() {
     let prestrain = hertels_gage().prestrain();
     compare("prestrain at 80 F, microstrain", -125.0, prestrain * 1e6);
     assert!((prestrain * 1e6 + 126.8).abs() < 0.05);
-    // The printed -0.0200 would have led further off: -129.0.
+    // The printed -0.0200 would give a larger deviation: -129.0.
     let of_printed = table_gage()
         .strain(-0.0200, kelvin_from_fahrenheit(80.0))
         .unwrap();
@@ -246,7 +246,7 @@ fn equation_30_torque_per_volt() {
     assert!((feet - 165.1).abs() < 0.05);
 }
 
-/// What could stand between the computed 0.166e3 and the measured 1.23e3.
+/// Possible explanations of the difference between the computed 0.166e3 and the measured 1.23e3.
 #[test]
 fn contributions_to_the_factor_between_computed_and_measured() {
     let foil = ArmLaw::foil(157.0).unwrap();
@@ -335,7 +335,7 @@ proptest! {
         let found = gage.strain(change, temperature_k).unwrap();
         let oracle = bisect(&gage, change, temperature_k, -3e-3, 3e-3);
         let (linear, bend) = gage.coefficients(temperature_k).unwrap();
-        // A rounding of the change, over the local slope.
+        // A rounding error of the change, over the local slope.
         let step = change.abs() / (linear + 2.0 * bend * strain).abs() + strain.abs();
         prop_assert!((found - oracle).abs() < 1e-14 * step + 1e-18, "{found} {oracle}");
         prop_assert!((found - strain).abs() < 1e-14 * step + 1e-18, "{found} {strain}");

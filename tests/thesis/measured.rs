@@ -74,7 +74,7 @@ fn equations_c18_to_c21_damping_and_stiffness() {
         stiffness,
     )
     .differs();
-    // Without rounding on the way: σ = 261.565, ω_d = 3695.99: f = 3.06031, K = 80313.3.
+    // Without intermediate rounding: σ = 261.565, ω_d = 3695.99: f = 3.06031, K = 80313.3.
     let exact = FreeDecay::new(4.0_f64.ln() / 5.3e-3, std::f64::consts::TAU / 1.7e-3).unwrap();
     let damping = us(
         Kind::AngularDamping,

@@ -54,7 +54,7 @@ fn inertia_us(parts: &[Part]) -> f64 {
 #[test]
 fn equation_17_stiffness_of_the_beam() {
     // 3·2.8²·30e6/(192·1.5³) = 7.056e8/648 = 1.088889e6 in lbf/rad; /12 = 9.07407e4. Printed are
-    // 10.8e5 in lbf/rad, cut off not rounded, and 9.08e4, which is 10.9e5/12 = 9.083e4.
+    // 10.8e5 in lbf/rad, truncated rather than rounded, and 9.08e4, which is 10.9e5/12 = 9.083e4.
     let got = stiffness_us(&thesis_beam());
     compare(
         "(17) in lbf/rad",
@@ -78,7 +78,7 @@ fn equation_17_stiffness_of_the_beam() {
 
 #[test]
 fn equation_14_rotation_is_deflection_over_radius() {
-    // (14) prints θ = y/r = L/r. Only y/r leads on to (16); L/r = 1.5/2.8 = 0.536 rad at any load.
+    // (14) prints θ = y/r = L/r. Only y/r leads to (16); L/r = 1.5/2.8 = 0.536 rad for any load.
     let force_n = si(Kind::Force, "100 lbf");
     let deflection = force_n / thesis_beam().tip_stiffness_n_per_m();
     let angle = beam::stator_rotation_rad(deflection, inches(2.8)).unwrap();
@@ -160,8 +160,8 @@ fn equation_21_natural_frequency() {
     compare("(21) f_n", (575.0, 0.5), (575.27, 5e-3), got).follows();
     let omega = got * std::f64::consts::TAU;
     compare("(21) ω_n", (3610.0, 5.0), (3614.52, 5e-3), omega).follows();
-    // The real part 8.9e-5/(2·6.95e-3) = 6.4029e-3 is right but for its sign: the root of a
-    // stand that damps is −0.0064 ± j3610.
+    // The real part 8.9e-5/(2·6.95e-3) = 6.4029e-3 is right except for its sign: the root of a
+    // damped stand is −0.0064 ± j3610.
     compare(
         "(21) |σ|",
         (0.0064, 5e-5),
@@ -193,9 +193,9 @@ fn equation_21_with_the_inertia_that_follows() {
     )
     .differs();
     // With shear in K: √(8.348148e4/6.064527e-3) = √1.376554e7 = 3710.194 rad/s, /2π = 590.496 Hz.
-    // Rounded: 590.5. Rounding on the way raises it (K = 8.35e4 gives 590.56, J = 6.064e-3 gives
+    // Rounded: 590.5. Intermediate rounding raises it (K = 8.35e4 gives 590.56, J = 6.064e-3 gives
     // 590.52), and standard gravity 32.174 ft/s² instead of 32.2 lowers it to 590.26. So 590.4 is
-    // 590.496 cut off, not rounded. Measured: 590 Hz.
+    // 590.496 truncated, not rounded. Measured: 590 Hz.
     let with_shear = stand(inertia, 8.9e-5, stiffness_us(&beam_with_shear()));
     let got = with_shear.natural_frequency_hz();
     compare(
@@ -280,7 +280,7 @@ fn appendix_a_diameters_are_used_as_radii() {
         got,
     )
     .differs();
-    // J and K share r², so the natural frequency cannot tell the two readings apart.
+    // J and K share r², so the natural frequency cannot distinguish the two readings.
     let narrow = stand(inertia, 8.9e-5, stiffness).natural_frequency_hz();
     crate::util::assert_close(narrow, 615.634, 1e-5);
 }

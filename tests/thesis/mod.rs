@@ -1,7 +1,8 @@
-//! Every number of the thesis, with its equation number, printed beside what follows from its inputs.
+//! Every number of the thesis, with its equation number, printed next to the result of its inputs.
 //!
-//! Every expected value was worked outside this crate with pencil arithmetic on the printed inputs in US units; the
-//! crate computes in SI. `cargo test --test tests thesis -- --nocapture` shows them all; `docs/thesis.md` sums them up.
+//! Every expected value was computed by hand, independently of this crate, from the printed inputs in US units; the
+//! crate computes in SI. `cargo test --test tests thesis -- --nocapture` shows them all; `docs/thesis.md` summarises
+//! them.
 
 mod appendix_d;
 mod comparison;

@@ -1,5 +1,5 @@
-//! The worked ways in `docs/ways`: every command of a page is run on recordings of known torque, its output compared with
-//! the page, and the final torque with the truth.
+//! The worked examples in `docs/ways`: every command of a page is run on recordings of known torque, its output
+//! compared with the page, and the final torque with the truth.
 //!
 //! In a block ```` ```console ```` a line `$ torqcomp …` (continued by `\`) is run, and `$ cat FILE` prints a file; what
 //! follows is what they print, standard output first. A block ```` ```toml ```` whose first line is `# FILE` is written to
@@ -19,20 +19,20 @@ use crate::golden::settle::settle;
 use crate::golden::words;
 use crate::util::{Folder, column};
 
-/// What a page promises of the torque in `torque.csv`.
+/// Stated accuracy of the torque in `torque.csv` on a page.
 struct Promise {
-    /// Length of either end that is not compared, ms.
+    /// Length of either end excluded from the comparison, ms.
     ends_ms: f64,
-    /// Least error of the torque as recorded, N m rms.
+    /// Minimum error of the torque as recorded, N m RMS.
     recorded_n_m: f64,
-    /// Largest error of the compensated torque, N m rms.
+    /// Maximum error of the compensated torque, N m RMS.
     compensated_n_m: f64,
 }
 
 impl Promise {
-    /// The promise of a page, in the one sentence for it.
+    /// The stated accuracy of a page, parsed from its sentence.
     fn of(page: &str) -> Self {
-        // Line ends in a paragraph mean nothing.
+        // Line ends within a paragraph are irrelevant.
         let words = page.split_whitespace().collect::<Vec<_>>().join(" ");
         let (_, mut rest) = words
             .split_once("Without the first and last ")
@@ -50,7 +50,7 @@ impl Promise {
     }
 }
 
-/// Runs the page of a way.
+/// Runs the page of an example.
 fn check(number: usize) {
     let way = &ways()[number];
     let page = Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -96,7 +96,7 @@ fn keeps(promise: &Promise, way: &Way, folder: &Folder) {
     );
 }
 
-/// The page with what its commands print now.
+/// The page with the present output of its commands.
 fn run(page: &str, folder: &Folder) -> String {
     let mut text = String::new();
     let mut lines = page.lines();

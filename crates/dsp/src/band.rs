@@ -1,10 +1,9 @@
-//! The band that a compensation covers, and its smooth edge.
+//! The band covered by a compensation, and its smooth edge.
 //!
-//! `W(f) = 1` up to the stated band, falls smoothly over the edge, and is `0` from there on. The
-//! fall is the running integral of a Kaiser window, so that the filter's impulse response decays
-//! as fast as a response with that edge width can: to about `e^{-β}` within
-//! `√(1+(β/π)²)/edge width` seconds (J. F. Kaiser, "Nonrecursive digital filter design using the
-//! I₀-sinh window function", ISCAS 1974).
+//! `W(f) = 1` up to the stated band, falls smoothly over the edge, and is `0` beyond it. The edge
+//! is the running integral of a Kaiser window, so that the filter's impulse response decays as fast
+//! as the edge width allows: to about `e^{-β}` within `√(1+(β/π)²)/edge width` seconds (J. F.
+//! Kaiser, "Nonrecursive digital filter design using the I₀-sinh window function", ISCAS 1974).
 
 mod choice;
 mod lines;
@@ -16,16 +15,16 @@ use crate::Error;
 pub use choice::{BandChoice, BandSearch, band_of_stand};
 pub use lines::DecidingLines;
 
-/// Shape of the Kaiser window behind the edge: `e^{-26} ≈ 5·10⁻¹²` is left in the filter's tail.
+/// Shape of the Kaiser window for the edge: the filter's tail is down to `e^{-26} ≈ 5·10⁻¹²`.
 const EDGE_BETA: f64 = 26.0;
-/// Width of the edge as a fraction of the band, where the rate leaves room.
+/// Width of the edge as a fraction of the band, where the sampling rate permits.
 const EDGE_FRACTION: f64 = 0.2;
-/// Highest band as a fraction of half the sampling rate: above it the edge is too steep to build.
+/// Highest band as a fraction of the Nyquist frequency: above it the edge would be too steep.
 const HIGHEST_FRACTION: f64 = 0.96;
-/// Band that is taken when the stated default does not fit under half the rate.
-/// Its edge then leaves room below half the rate to see the recorder's noise.
+/// Fallback band, as a fraction of the Nyquist frequency, when the default band does not fit below
+/// it. Its edge leaves room to see the recorder's noise.
 const FALLBACK_FRACTION: f64 = 0.7;
-/// Nodes of the table that the edge is interpolated from.
+/// Nodes of the table from which the edge is interpolated.
 const EDGE_NODES: usize = 1024;
 
 /// The stated band of a compensation at one sampling rate.
@@ -39,11 +38,11 @@ pub struct Band {
 impl Band {
     /// A band from 0 to `top_hz`, with an edge above it.
     ///
-    /// The edge is a fifth of the band wide, or as wide as half the sampling rate allows.
+    /// The edge is a fifth of the band wide, or as wide as the Nyquist frequency allows.
     ///
     /// # Errors
     /// [`Error::NotPositive`] for a rate or band that is not positive, [`Error::RateTooLow`] if
-    /// `top_hz` lies above 0.96 of half the rate.
+    /// `top_hz` lies above 0.96 of the Nyquist frequency.
     ///
     /// ```
     /// use torqcomp_dsp::band::Band;
@@ -66,7 +65,7 @@ impl Band {
         positive("band", top_hz)?;
         let nyquist_hz = 0.5 * sample_rate_hz;
         let highest_band_hz = HIGHEST_FRACTION * nyquist_hz;
-        // The allowance is for a band computed as that very fraction.
+        // The tolerance admits a band computed as exactly this fraction.
         if top_hz > highest_band_hz * (1.0 + 1e-12) {
             return Err(Error::RateTooLow {
                 sample_rate_hz,
@@ -82,15 +81,16 @@ impl Band {
         })
     }
 
-    /// Frequency from which on a band up to `top_hz` passes nothing.
+    /// Upper end of the edge for a band up to `top_hz`, in Hz.
     fn end_of(sample_rate_hz: f64, top_hz: f64) -> f64 {
         (top_hz * (1.0 + EDGE_FRACTION)).min(0.5 * sample_rate_hz)
     }
 
-    /// The wanted band if the rate carries it with its full edge, or else 0.7 of half the rate.
+    /// The wanted band if it fits with its full edge at this rate, otherwise 0.7 of the Nyquist
+    /// frequency.
     ///
     /// # Errors
-    /// As [`Band::new`].
+    /// As for [`Band::new`].
     ///
     /// ```
     /// use torqcomp_dsp::band::Band;
@@ -105,19 +105,19 @@ impl Band {
         )
     }
 
-    /// Rate of the records that the band is meant for, in Hz.
+    /// Sampling rate in Hz.
     #[must_use]
     pub fn sample_rate_hz(&self) -> f64 {
         self.sample_rate_hz
     }
 
-    /// Upper end of the part that is compensated in full, in Hz.
+    /// Upper end of the fully compensated range, in Hz.
     #[must_use]
     pub fn top_hz(&self) -> f64 {
         self.top_hz
     }
 
-    /// Frequency from which on nothing is passed, in Hz.
+    /// Upper end of the edge, in Hz; nothing passes above it.
     #[must_use]
     pub fn end_hz(&self) -> f64 {
         self.end_hz
@@ -131,7 +131,7 @@ impl Band {
     }
 }
 
-/// The same for every band.
+/// The edge, common to all bands.
 static EDGE: LazyLock<Edge> = LazyLock::new(Edge::new);
 
 /// Smooth step from 0 at `x = 0` to 1 at `x = 1`: the running integral of a Kaiser window.
@@ -181,7 +181,7 @@ fn gauss3(a: f64, b: f64) -> f64 {
     half * (5.0 * kaiser(mid - offset) + 8.0 * kaiser(mid) + 5.0 * kaiser(mid + offset)) / 9.0
 }
 
-/// Kaiser window on `[0, 1]`, scaled to 1 in the middle.
+/// Kaiser window on `[0, 1]`, normalised to 1 in the middle.
 fn kaiser(x: f64) -> f64 {
     let u = 2.0 * x - 1.0;
     static MIDDLE: LazyLock<f64> = LazyLock::new(|| bessel_i0(EDGE_BETA));
@@ -250,7 +250,7 @@ mod tests {
         assert!(error.to_string().contains("at most 1920 Hz"), "{error}");
         assert!(Band::new(0.0, 1.0).is_err());
         assert!(Band::new(1000.0, f64::NAN).is_err());
-        // A steep edge is fine as long as it fits under half the rate.
+        // A steep edge is accepted as long as it fits below the Nyquist frequency.
         assert_eq!(Band::new(1000.0, 480.0).unwrap().end_hz(), 500.0);
     }
 }

@@ -1,24 +1,23 @@
 //! The strain-gage bridge: exact output from strain, and strain from output.
 //!
-//! A [`Bridge`] is a ring of four arms ([`BridgeLayout`]) whose active arms
-//! follow an [`ArmLaw`], fed by a [`Supply`], reached over [`Leads`] and read
-//! by a recorder of finite input resistance. Nothing is linearised: the
-//! network is solved by Kirchhoff's laws and inverted to rounding.
+//! A [`Bridge`] is a ring of four arms ([`BridgeLayout`]) whose active arms follow an [`ArmLaw`],
+//! fed by a [`Supply`], connected by [`Leads`] and read by a recorder of finite input resistance.
+//! Nothing is linearised: the network is solved by Kirchhoff's laws and inverted to rounding.
 //!
-//! What each part does to the volts of Hertel's bridge (22.5 V, 5784 ohm arms,
-//! gage factor 157; thesis eqs. 28 to 30, computed 165 ft lbf/V against a
-//! measured 1.23e3 ft lbf/V, a factor 7.4):
+//! Effect of each part on the output of Hertel's bridge (22.5 V, 5784 ohm arms, gage factor 157;
+//! thesis eqs. 28 to 30, computed 165 ft lbf/V against a measured 1.23e3 ft lbf/V, a factor of
+//! 7.4):
 //!
-//! | departure | volts fall by |
+//! | departure | output reduced by a factor of |
 //! |---|---|
-//! | one gage (quarter bridge) in place of the two of eq. (28) | 2 |
+//! | one gage (quarter bridge) instead of the two of eq. (28) | 2 |
 //! | recorder of input resistance R_in | 1 + 5784 ohm / R_in |
 //! | 10 ohm two-wire leads on a quarter bridge | 1.0035 |
 //! | curvature of the quarter bridge at 50 microstrain | 1.004 |
 //!
-//! A quarter bridge would leave 3.7 of the 7.4, which a recorder of about
-//! 2120 ohm would explain; the record does not tell. A measured torque per
-//! volt settles it: [`Conversion::linear`](crate::conversion::Conversion::linear).
+//! A quarter bridge would leave a factor of 3.7 of the 7.4, which a recorder input of about 2120
+//! ohm would explain; the thesis does not say. A measured torque per volt avoids the question:
+//! [`Conversion::linear`](crate::conversion::Conversion::linear).
 
 mod arm;
 mod layout;
@@ -32,18 +31,18 @@ pub use layout::{BridgeLayout, Leads, Supply};
 use crate::gage::GageError;
 use network::Network;
 
-/// What can be wrong with a bridge or with a value asked of it.
+/// An error in a bridge or in a value given to it.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BridgeError {
-    /// A parameter is not usable.
+    /// Invalid parameter.
     #[error("{what} must be {expected}, got {got}; correct the bridge's data")]
     InvalidParameter {
         /// Name of the parameter.
         what: &'static str,
-        /// What is accepted.
+        /// The accepted range.
         expected: &'static str,
-        /// What was given.
+        /// The value.
         got: f64,
     },
     /// The wiring needs the gages in arms 1 and 2.
@@ -57,14 +56,14 @@ pub enum BridgeError {
         /// The leads.
         leads: Leads,
     },
-    /// The strain is outside the range of the arms.
+    /// Strain outside the range of the arms.
     #[error("strain must lie from {low} to {high}, got {got}; check its unit (m/m)")]
     StrainOutOfRange {
-        /// Least strain.
+        /// Lower limit of strain.
         low: f64,
-        /// Greatest strain.
+        /// Upper limit of strain.
         high: f64,
-        /// What was given.
+        /// The strain.
         got: f64,
     },
     /// No strain in range gives the voltage.
@@ -73,37 +72,36 @@ pub enum BridgeError {
          check amplifier gain, supply and recorder zero"
     )]
     VoltageOutOfRange {
-        /// Least output, V.
+        /// Lower limit of the output, V.
         low_v: f64,
-        /// Greatest output, V.
+        /// Upper limit of the output, V.
         high_v: f64,
-        /// What was given, V.
+        /// The voltage, V.
         got_v: f64,
     },
-    /// The search for the strain did not settle.
+    /// The iteration for the strain did not converge.
     #[error(
         "strain for {got_v} V must settle within {steps} steps, got {strain} at the last; \
          check the bridge's data for extreme values"
     )]
     NotConverged {
-        /// Steps allowed.
+        /// Maximum number of steps.
         steps: u32,
         /// The voltage, V.
         got_v: f64,
         /// Strain at the last step.
         strain: f64,
     },
-    /// The gage has no such state.
+    /// No such state of the gage.
     #[error(transparent)]
     Gage(#[from] GageError),
 }
 
 /// A four-arm bridge with its supply, leads and recorder.
 ///
-/// Fixed arms equal the unstrained active arm (`arm_resistance_ohm`), so the
-/// bridge balances at no load unless two-wire leads or a drifted single gage
-/// unbalance it; [`zero_output_v`](Self::zero_output_v) is that unbalance, for
-/// the caller to subtract.
+/// Fixed arms equal the unstrained active arm (`arm_resistance_ohm`), so the bridge is balanced at
+/// no load except for two-wire leads or a drifted single gage;
+/// [`zero_output_v`](Self::zero_output_v) is that imbalance, for the caller to subtract.
 ///
 /// ```
 /// use torqcomp_dsp::bridge::{ArmLaw, Bridge, BridgeLayout, Supply};
@@ -134,7 +132,7 @@ pub struct Bridge {
 }
 
 impl Bridge {
-    /// Steps the inverse may take; bisection alone would need about 60.
+    /// Maximum number of steps of the inverse; bisection alone would need about 60.
     const STEPS: u32 = 200;
 
     /// A bridge with resistance-free leads and an unloaded output.
@@ -166,7 +164,7 @@ impl Bridge {
         Ok(Self::derive(layout, law, arm, supply, Leads::None, None))
     }
 
-    /// The same bridge behind wires.
+    /// Adds lead wires.
     ///
     /// # Errors
     /// [`BridgeError::InvalidParameter`] for a wire resistance that is negative
@@ -190,7 +188,7 @@ impl Bridge {
         Ok(Self::derive(layout, law, arm, supply, leads, input))
     }
 
-    /// The same bridge read by a recorder of input resistance R_in (ohm).
+    /// Sets the input resistance R_in of the recorder, in ohm.
     ///
     /// # Errors
     /// [`BridgeError::InvalidParameter`] when R_in is not above zero.
@@ -269,12 +267,12 @@ impl Bridge {
         self.leads
     }
 
-    /// Input resistance of the recorder, ohm; `None` when it draws no current.
+    /// Input resistance of the recorder, ohm; `None` if infinite.
     pub fn input_resistance_ohm(&self) -> Option<f64> {
         self.input_resistance_ohm
     }
 
-    /// Strains in which every active arm follows its law.
+    /// Range of strain in which every active arm follows its law.
     pub fn strain_range(&self) -> (f64, f64) {
         self.range
     }
@@ -295,12 +293,12 @@ impl Bridge {
         }
     }
 
-    /// Voltage at no load, V: what two-wire leads or drift leave unbalanced.
+    /// Voltage at no load, V: the imbalance due to two-wire leads or drift.
     pub fn zero_output_v(&self) -> f64 {
         self.at_zero.0
     }
 
-    /// Volts per unit strain about no load, leads and loading included.
+    /// Volts per unit strain about no load, including leads and loading.
     ///
     /// For an unloaded balanced bridge this is `(n/4) E_s GF`: thesis eq. (28)
     /// with `E_s GF / 2` for the half bridge, `E_s GF / 4` for the quarter.
@@ -324,7 +322,7 @@ impl Bridge {
         self.network.output_resistance([0.0; 4]) * self.arm_resistance_ohm
     }
 
-    /// Factor `1 + R_th/R_in` by which the recorder lowers the volts at no load.
+    /// Factor `1 + R_th/R_in` by which the recorder's loading reduces the output at no load.
     pub fn loading_factor(&self) -> f64 {
         self.input_resistance_ohm
             .map_or(1.0, |input| 1.0 + self.output_resistance_ohm() / input)
@@ -333,13 +331,12 @@ impl Bridge {
     /// Strain (m/m) that gives a voltage (V) at the recorder's terminals, the
     /// exact inverse of [`output_v`](Self::output_v).
     ///
-    /// Every arm moves the output one way over the whole range, so the strain
-    /// is unique; Newton's iteration, kept inside a shrinking bracket, finds it
-    /// to rounding.
+    /// The output is monotonic in the strain over the whole range, so the solution is unique;
+    /// Newton's method, safeguarded by a shrinking bracket, finds it to rounding.
     ///
     /// # Errors
-    /// [`BridgeError::VoltageOutOfRange`] when no strain in range gives the
-    /// voltage; [`BridgeError::NotConverged`] if the iteration does not settle.
+    /// [`BridgeError::VoltageOutOfRange`] when no strain in range gives the voltage;
+    /// [`BridgeError::NotConverged`] if the iteration does not converge.
     pub fn strain(&self, output_v: f64) -> Result<f64, BridgeError> {
         let (mut low, mut high) = self.range;
         let (at_low, at_high) = self.ends_v;
@@ -365,13 +362,13 @@ impl Bridge {
                 low = strain;
             }
             let newton = strain - miss / slope;
-            // A step that does not halve gives way to bisection, which bounds
-            // the count; false, too, for the NaN of a zero slope.
+            // A step that does not halve the interval is replaced by bisection, which bounds the
+            // count; also false for the NaN of a zero slope.
             let good =
                 newton >= low && newton <= high && 2.0 * (newton - strain).abs() <= last_step;
             let next = if good { newton } else { 0.5 * (low + high) };
             last_step = (next - strain).abs();
-            // The output carries a few roundings; a step below them is noise.
+            // The output has a few rounding errors; a smaller step is noise.
             let noise = 16.0 * f64::EPSILON * (next.abs() + (output_v / slope).abs());
             if (good && last_step <= noise) || next == strain {
                 return Ok(next);
@@ -410,8 +407,8 @@ fn require(
     }
 }
 
-/// The network in units of the arm resistance; `load` is that over the
-/// recorder's.
+/// The network in units of the arm resistance; `load` is the arm resistance over that of the
+/// recorder.
 fn wire(
     layout: &BridgeLayout,
     law: &ArmLaw,
@@ -444,7 +441,7 @@ fn wire(
     }
 }
 
-/// Strains that keep every active arm within its law.
+/// Range of strain that keeps every active arm within its law.
 fn strain_range(law: &ArmLaw, factors: [Option<f64>; 4]) -> (f64, f64) {
     let (low, high) = law.strain_range();
     let active = factors.into_iter().flatten().filter(|&f| f != 0.0);

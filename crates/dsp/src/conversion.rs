@@ -1,23 +1,23 @@
-//! From recorded samples to the applied quantity.
+//! Conversion of recorded samples to the applied quantity.
 //!
-//! A [`Conversion`] turns what the recorder stored into torque, or whatever
-//! unit the applied quantity has, sample by sample, and back.
+//! A [`Conversion`] maps recorded samples to torque, or any other unit of the applied quantity,
+//! sample by sample, and back.
 
 use crate::bridge::{Bridge, BridgeError};
 use crate::curve::CalibrationCurve;
 
-/// What can be wrong with a conversion or a sample.
+/// An error in a conversion or a sample.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConversionError {
-    /// A coefficient is not usable.
+    /// Invalid coefficient.
     #[error("{what} must be {expected}, got {got}; correct the conversion's data")]
     InvalidCoefficient {
         /// Name of the coefficient.
         what: &'static str,
-        /// What is accepted.
+        /// The accepted range.
         expected: &'static str,
-        /// What was given.
+        /// The value.
         got: f64,
     },
     /// The value or its conversion is not a finite number.
@@ -28,13 +28,13 @@ pub enum ConversionError {
     NotFinite {
         /// Which value.
         what: &'static str,
-        /// What was given.
+        /// The value.
         got: f64,
     },
-    /// The bridge cannot have given the value.
+    /// The bridge cannot produce the value.
     #[error(transparent)]
     Bridge(#[from] BridgeError),
-    /// Points or coefficients that make no curve.
+    /// Points or coefficients that do not define a curve.
     #[error(
         "the calibration must have two points or more and rise or fall throughout; \
          correct its points, or choose a lower degree"
@@ -46,24 +46,24 @@ pub enum ConversionError {
          calibrate over the whole range of the record"
     )]
     BeyondCurve {
-        /// Least calibrated value.
+        /// Lower limit of the calibrated range.
         low: f64,
-        /// Greatest calibrated value.
+        /// Upper limit of the calibrated range.
         high: f64,
-        /// What was given.
+        /// The value.
         got: f64,
     },
-    /// An applied value that a calibration curve does not reach.
+    /// An applied value outside the range of a calibration curve.
     #[error(
         "the calibration reaches from {low} to {high} (SI units), got {got}; \
          calibrate over the whole range"
     )]
     NotOnCurve {
-        /// Least applied value.
+        /// Lower limit of the applied values.
         low: f64,
-        /// Greatest applied value.
+        /// Upper limit of the applied values.
         high: f64,
-        /// What was given.
+        /// The value.
         got: f64,
     },
     /// A sample of a slice failed.
@@ -71,12 +71,12 @@ pub enum ConversionError {
     Sample {
         /// Index of the sample in the slice, from 0.
         index: usize,
-        /// Why it failed.
+        /// The error.
         source: Box<ConversionError>,
     },
 }
 
-/// How a recorded value becomes the applied quantity.
+/// Conversion of a recorded value to the applied quantity.
 ///
 /// Made by [`linear`](Self::linear), [`bridge`](Self::bridge) and
 /// [`strain`](Self::strain), which check the coefficients. The applied unit is
@@ -84,8 +84,7 @@ pub enum ConversionError {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Conversion {
-    /// `applied = gain × recorded + offset`: a measured constant, which takes
-    /// the place of every computed one.
+    /// `applied = gain × recorded + offset`: a measured constant, which replaces all computed ones.
     #[non_exhaustive]
     Linear {
         /// Applied unit per recorded unit.
@@ -183,8 +182,7 @@ impl Conversion {
         })
     }
 
-    /// A record that is strain already, `applied = torque_per_strain × ε`
-    /// (thesis eq. 27a: 3.50e6 in lbf).
+    /// A record of strain, `applied = torque_per_strain × ε` (thesis eq. 27a: 3.50e6 in lbf).
     ///
     /// # Errors
     /// [`ConversionError::InvalidCoefficient`] when the factor is zero or not finite.
@@ -224,11 +222,11 @@ impl Conversion {
         })
     }
 
-    /// The applied value of one recorded value.
+    /// Applied value from a recorded value.
     ///
     /// # Errors
-    /// [`ConversionError::NotFinite`] when the value or the result is not
-    /// finite; [`ConversionError::Bridge`] when the bridge cannot have given it.
+    /// [`ConversionError::NotFinite`] when the value or the result is not finite;
+    /// [`ConversionError::Bridge`] when the bridge cannot produce it.
     pub fn convert(&self, recorded: f64) -> Result<f64, ConversionError> {
         let applied = match self {
             Self::Linear { gain, offset } => gain * recorded + offset,
@@ -255,11 +253,10 @@ impl Conversion {
         finite("recorded sample", applied, recorded)
     }
 
-    /// The recorded value of an applied one, the inverse of
-    /// [`convert`](Self::convert).
+    /// Recorded value from an applied value, the inverse of [`convert`](Self::convert).
     ///
     /// # Errors
-    /// As [`convert`](Self::convert).
+    /// As for [`convert`](Self::convert).
     ///
     /// ```
     /// use torqcomp_dsp::conversion::Conversion;
@@ -293,8 +290,8 @@ impl Conversion {
     /// Converts every sample in place.
     ///
     /// # Errors
-    /// [`ConversionError::Sample`] with the index of the first sample that does
-    /// not convert; those before it are converted, it and the rest are untouched.
+    /// [`ConversionError::Sample`] with the index of the first sample that fails; those before it
+    /// are converted, it and the rest are unchanged.
     ///
     /// ```
     /// use torqcomp_dsp::conversion::Conversion;
@@ -313,7 +310,7 @@ impl Conversion {
         }
     }
 
-    /// Applied unit per recorded unit about no load; of a curve in the middle of its range.
+    /// Applied unit per recorded unit about no load; for a curve, at the middle of its range.
     pub fn small_signal_gain(&self) -> f64 {
         match self {
             Self::Curve { curve, scale, .. } => {
@@ -331,8 +328,8 @@ impl Conversion {
         }
     }
 
-    /// Straight-line conversion in blocks: both passes over a block stay in
-    /// the first cache and have no branch inside.
+    /// Linear conversion in blocks: both passes over a block stay in the L1 cache and are
+    /// branch-free.
     fn convert_lines(
         &self,
         samples: &mut [f64],
@@ -351,7 +348,7 @@ impl Conversion {
         Ok(())
     }
 
-    /// Sample by sample; `start` is the index of the first one.
+    /// Converts sample by sample; `start` is the index of the first one.
     fn convert_each(&self, samples: &mut [f64], start: usize) -> Result<(), ConversionError> {
         for (index, value) in samples.iter_mut().enumerate() {
             *value = self
@@ -403,8 +400,8 @@ mod tests {
     use crate::bridge::{ArmLaw, BridgeLayout, Leads, Supply};
     use proptest::prelude::*;
 
-    /// A quarter bridge whose two-wire leads unbalance it, recorded through an
-    /// inverting amplifier with a zero of its own.
+    /// A quarter bridge unbalanced by its two-wire leads, recorded through an inverting amplifier
+    /// with an offset.
     fn unbalanced() -> Conversion {
         let law = ArmLaw::new(0.0, 157.0, 2800.0).unwrap();
         let supply = Supply::ConstantVoltage { volts: 22.5 };

@@ -1,17 +1,18 @@
-//! A calibration curve: applied quantity over recorded quantity, from points or as a polynomial.
+//! A calibration curve: applied over recorded quantity, from points or as a polynomial.
 
 use crate::conversion::ConversionError;
 use crate::sort_by_number;
 
-/// Part of the calibrated range by which a curve is continued beyond either end, along its tangent there.
+/// Part of the calibrated range by which a curve is extrapolated beyond either end, along its tangent
+/// there.
 pub const CONTINUED: f64 = 0.2;
 
-/// Points at which a polynomial is checked for a change of direction.
+/// Points at which a polynomial is checked for monotonicity.
 const CHECKED: u32 = 1000;
-/// Halvings of the range that bring an inverse to the last digit.
+/// Bisections that give an inverse to the last digit.
 const HALVINGS: u32 = 200;
 
-/// A curve that rises or falls throughout.
+/// A monotonic curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationCurve {
     shape: CurveShape,
@@ -21,18 +22,18 @@ pub struct CalibrationCurve {
 
 #[derive(Debug, Clone, PartialEq)]
 enum CurveShape {
-    /// Recorded and applied value, rising in the recorded one.
+    /// Recorded and applied values, in ascending order of the recorded one.
     Points(Vec<(f64, f64)>),
-    /// Coefficients over rising powers of the recorded value.
+    /// Coefficients in ascending powers of the recorded value.
     Polynomial(Vec<f64>),
 }
 
 impl CalibrationCurve {
-    /// Straight lines between points of recorded and applied value, in any order.
+    /// Linear interpolation between points of recorded and applied value, in any order.
     ///
     /// # Errors
-    /// [`ConversionError::NoCurve`] for fewer than two points, two at one recorded value, or applied values that do not
-    /// rise or fall throughout.
+    /// [`ConversionError::NoCurve`] for fewer than two points, two at one recorded value, or applied values that are
+    /// not monotonic.
     ///
     /// ```
     /// use torqcomp_dsp::curve::CalibrationCurve;
@@ -68,7 +69,7 @@ impl CalibrationCurve {
     /// `applied = c₀ + c₁ x + c₂ x² + …` over the recorded values x from `low` to `high`.
     ///
     /// # Errors
-    /// [`ConversionError::NoCurve`] if it does not rise or fall throughout that range.
+    /// [`ConversionError::NoCurve`] if it is not monotonic over that range.
     ///
     /// ```
     /// use torqcomp_dsp::curve::CalibrationCurve;
@@ -99,13 +100,13 @@ impl CalibrationCurve {
         }
     }
 
-    /// Least and greatest recorded value of the calibration.
+    /// Lower and upper limit of the calibrated range.
     #[must_use]
     pub fn range(&self) -> (f64, f64) {
         (self.low, self.high)
     }
 
-    /// Applied value at a recorded one.
+    /// Applied value at a recorded value.
     ///
     /// # Errors
     /// [`ConversionError::BeyondCurve`] if it lies beyond the calibrated range by more than [`CONTINUED`] of it.
@@ -122,10 +123,10 @@ impl CalibrationCurve {
         Ok(self.within(end) + self.slope(end) * (recorded - end))
     }
 
-    /// Recorded value of an applied one, by halving.
+    /// Recorded value for an applied value, by bisection.
     ///
     /// # Errors
-    /// [`ConversionError::NotOnCurve`] if no recorded value within the continued range gives it.
+    /// [`ConversionError::NotOnCurve`] if no recorded value within the extrapolated range gives it.
     pub fn recorded(&self, applied: f64) -> Result<f64, ConversionError> {
         let (mut low, mut high) = self.continued();
         let ends = [self.applied(low)?, self.applied(high)?];
@@ -175,15 +176,15 @@ impl CalibrationCurve {
         }
     }
 
-    /// The range with what is continued beyond it.
+    /// The calibrated range with its extrapolation.
     fn continued(&self) -> (f64, f64) {
-        // A rounding more, so that the ends themselves are on the curve.
+        // Slightly more, so that the ends themselves are on the curve.
         let more = CONTINUED * (1.0 + 1e-12) * (self.high - self.low);
         (self.low - more, self.high + more)
     }
 }
 
-/// The two points between which a recorded value lies, or the nearest two.
+/// The two points that bracket a recorded value, or the nearest two.
 fn around(points: &[(f64, f64)], recorded: f64) -> [(f64, f64); 2] {
     let after = points.partition_point(|p| p.0 < recorded);
     let last = after.clamp(1, points.len() - 1);

@@ -1,4 +1,4 @@
-//! Decimation of records whose upper frequencies are only noise.
+//! Decimation of records whose upper frequencies contain only noise.
 
 use std::f64::consts::PI;
 
@@ -6,12 +6,12 @@ use crate::Error;
 
 /// Half-length of the low-pass in samples of the result.
 const REACH: usize = 8;
-/// Corner over the new rate.
+/// Corner relative to the new rate.
 const CORNER: f64 = 0.36;
-/// Shape of the Kaiser window, for 80 dB.
+/// Shape parameter of the Kaiser window, for 80 dB.
 const BETA: f64 = 7.9;
 
-/// Frequency, over the new rate, up to which the response is 1 within 2·10⁻⁴.
+/// Frequency, relative to the new rate, up to which the response is 1 within 2·10⁻⁴.
 pub const PASS: f64 = 0.2;
 
 /// A record at a lower rate.
@@ -19,17 +19,17 @@ pub const PASS: f64 = 0.2;
 pub struct Decimated {
     /// Its samples.
     pub samples: Vec<f64>,
-    /// Place of the first of them in the record.
+    /// Index of the first of them in the record.
     pub first: usize,
-    /// Samples of the record per sample.
+    /// Decimation factor.
     pub factor: usize,
 }
 
-/// Low-passes a record (symmetrical Kaiser-windowed sinc) and keeps every `factor`-th sample, where the filter lies within
-/// the record.
+/// Low-pass filters a record (symmetrical Kaiser-windowed sinc) and keeps every `factor`-th sample, where the filter
+/// lies within the record.
 ///
-/// A sum of exponentials keeps its frequencies and decay rates, as a linear filter changes only amplitudes; below [`PASS`]
-/// times the new rate it also keeps those.
+/// A sum of exponentials keeps its frequencies and decay rates, as a linear filter changes only amplitudes; below
+/// [`PASS`] times the new rate it also keeps those.
 ///
 /// # Errors
 /// [`Error::TooShort`] if fewer than two samples would remain.
@@ -80,7 +80,7 @@ fn taps(half: usize, corner: f64) -> Vec<f64> {
     taps
 }
 
-/// The same with a gain of about [`window_gain`].
+/// The same, with a gain of about [`window_gain`].
 pub(crate) fn windowed_sinc(half: usize, corner: f64) -> Vec<f64> {
     let tap = |i: usize| {
         let k = i as f64 - half as f64;
@@ -95,12 +95,12 @@ pub(crate) fn windowed_sinc(half: usize, corner: f64) -> Vec<f64> {
     (0..=2 * half).map(tap).collect()
 }
 
-/// The middle of the Kaiser window as it is computed here.
+/// Centre value of the Kaiser window as computed here.
 pub(crate) fn window_gain() -> f64 {
     bessel_i0(BETA)
 }
 
-/// Modified Bessel function of order 0 by its series.
+/// Modified Bessel function of order 0, by its series.
 fn bessel_i0(x: f64) -> f64 {
     let (mut term, mut sum, mut k) = (1.0, 1.0, 1.0);
     while term > 1e-17 * sum {

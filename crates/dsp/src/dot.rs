@@ -8,7 +8,7 @@
 /// ```
 #[must_use]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Eight independent sums, so that no addition waits for the one before.
+    // Eight independent sums, so that no addition depends on the one before.
     let mut sums = [0.0_f64; 8];
     let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
     let rest = a8.remainder().iter().zip(b8.remainder());

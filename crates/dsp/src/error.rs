@@ -1,4 +1,4 @@
-//! What can go wrong when a record is processed.
+//! Errors of signal processing.
 
 use thiserror::Error;
 
@@ -9,12 +9,12 @@ pub enum Error {
     /// A rate, frequency or length that must be positive and finite is not.
     #[error("{name} is {value}, expected a positive finite number")]
     NotPositive {
-        /// Which quantity.
+        /// Name of the quantity.
         name: &'static str,
-        /// What was given.
+        /// The value.
         value: f64,
     },
-    /// The sampling rate cannot carry the requested band.
+    /// The sampling rate is too low for the requested band.
     #[error(
         "the record's rate of {sample_rate_hz} Hz carries frequencies below {nyquist_hz} Hz, \
          the band asked for ends at {band_hz} Hz: record faster, or ask for a band of at most \
@@ -23,9 +23,9 @@ pub enum Error {
     RateTooLow {
         /// Rate of the record.
         sample_rate_hz: f64,
-        /// Half the rate.
+        /// Nyquist frequency.
         nyquist_hz: f64,
-        /// The band that was asked for.
+        /// The requested band.
         band_hz: f64,
         /// The highest band that this rate allows.
         highest_band_hz: f64,
@@ -36,10 +36,10 @@ pub enum Error {
          so nothing can be recovered; end the band below it"
     )]
     InverseNotFinite {
-        /// Where it happened.
+        /// The frequency.
         frequency_hz: f64,
     },
-    /// The inverse filter would have to be longer than is sensible.
+    /// The inverse filter would be too long.
     #[error(
         "the inverse filter does not die out within {samples} samples ({seconds} s): the band of \
          {band_hz} Hz is very narrow for a rate of {sample_rate_hz} Hz, or the inverse response \
@@ -50,19 +50,19 @@ pub enum Error {
         samples: usize,
         /// The same in seconds.
         seconds: f64,
-        /// The band that was asked for.
+        /// The requested band.
         band_hz: f64,
         /// Rate of the record.
         sample_rate_hz: f64,
     },
-    /// The record has too few samples for what was asked.
+    /// Too few samples.
     #[error("the record has {got} samples, {what} needs at least {expected}: use a longer record")]
     TooShort {
-        /// What needed more.
+        /// What needs more samples.
         what: &'static str,
         /// Samples needed.
         expected: usize,
-        /// Samples at hand.
+        /// Samples available.
         got: usize,
     },
     /// A sample is NaN or infinite.
@@ -73,7 +73,7 @@ pub enum Error {
         /// Its value.
         value: f64,
     },
-    /// Two component frequencies are too close for the length of the record.
+    /// Two components that cannot be resolved within the length of the record.
     #[error(
         "components {first_hz} Hz and {second_hz} Hz cannot be told apart in {seconds} s: \
          record at least {needed_s} s, or ask for fewer orders"
@@ -85,20 +85,20 @@ pub enum Error {
         second_hz: f64,
         /// Length of the record.
         seconds: f64,
-        /// Length that would do.
+        /// Required length of the record.
         needed_s: f64,
     },
-    /// A component lies at or above half the sampling rate.
+    /// A component at or above the Nyquist frequency.
     #[error(
         "a component at {frequency_hz} Hz cannot be seen at a rate of {sample_rate_hz} Hz: \
          ask for orders below {nyquist_hz} Hz"
     )]
     AboveNyquist {
-        /// The component.
+        /// Frequency of the component.
         frequency_hz: f64,
         /// Rate of the record.
         sample_rate_hz: f64,
-        /// Half of it.
+        /// Nyquist frequency.
         nyquist_hz: f64,
     },
     /// No frequency near the given one fits the record.
@@ -107,18 +107,18 @@ pub enum Error {
          leave it as it is"
     )]
     NotRefined {
-        /// Where the search began.
+        /// Start frequency of the search.
         start_hz: f64,
-        /// What went wrong.
+        /// The reason.
         why: &'static str,
     },
-    /// Samples that were kept can no longer be read.
+    /// Stored samples can no longer be read.
     #[error("the samples cannot be read again: {why}")]
     Unreadable {
-        /// What went wrong.
+        /// The reason.
         why: String,
     },
-    /// A gap in the time stamps is too long to be bridged.
+    /// A gap in the time stamps is too long to interpolate.
     #[error(
         "a gap of {gap_s} s, {steps} steps long, ends at {time_s} s: more would be invented than \
          measured; split the record there"
@@ -128,10 +128,10 @@ pub enum Error {
         time_s: f64,
         /// Length of the gap.
         gap_s: f64,
-        /// The same in steps of the grid.
+        /// Length in steps of the grid.
         steps: f64,
     },
-    /// Time stamps that do not increase cannot be resampled.
+    /// Time stamps that are not increasing.
     #[error(
         "time stamp {index} ({time_s} s) does not lie after the one before it ({previous_s} s)"
     )]
@@ -140,7 +140,7 @@ pub enum Error {
         index: usize,
         /// The later stamp.
         time_s: f64,
-        /// The stamp before it.
+        /// The preceding stamp.
         previous_s: f64,
     },
 }

@@ -1,29 +1,28 @@
 //! Semiconductor and foil strain gages: resistance from strain and back.
 //!
-//! A semiconductor gage is not linear, and its sensitivity falls with rising
-//! absolute temperature. [`Gage`] is the free gage with the law of its data
-//! sheet; [`Gage::bond`] glues it down and gives a [`BondedGage`], which knows
-//! the strain the glue locked in and answers relative to the bonded resistance,
-//! the one a bridge sees.
+//! A semiconductor gage is nonlinear, and its sensitivity falls with rising absolute temperature.
+//! [`Gage`] is the free gage with the law of its data sheet; [`Gage::bond`] gives a [`BondedGage`],
+//! which includes the strain locked in by the glue and refers to the bonded resistance, the one a
+//! bridge sees.
 //!
 //! Source: T. P. Hertel's thesis, Appendix B (data reduction after the
 //! Baldwin-Lima-Hamilton *Semiconductor Strain Gage Handbook*, section 2).
 
-/// What can be wrong with a gage or with a value asked of it.
+/// An error in a gage or in a value given to it.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GageError {
-    /// A parameter is not usable.
+    /// Invalid parameter.
     #[error("{what} must be {expected}, got {got}; correct the gage's data")]
     InvalidParameter {
         /// Name of the parameter.
         what: &'static str,
-        /// What is accepted.
+        /// The accepted range.
         expected: &'static str,
-        /// What was given.
+        /// The value.
         got: f64,
     },
-    /// The strain lies where the law no longer describes a gage.
+    /// The strain lies beyond the validity of the law.
     #[error(
         "strain must keep the gage on the rising side of its parabola, short of {limit} \
          at {temperature_k} K, got {got}; check the strain's unit (m/m, not microstrain)"
@@ -33,23 +32,23 @@ pub enum GageError {
         limit: f64,
         /// Temperature, K.
         temperature_k: f64,
-        /// What was given.
+        /// The strain.
         got: f64,
     },
-    /// No strain gives the resistance change, or no resistance is left.
+    /// No strain gives the resistance change, or no resistance remains.
     #[error(
         "resistance change must stay short of {limit}, got {got}; \
          check that it is a fraction of the unbonded resistance"
     )]
     ResistanceChangeOutOfRange {
-        /// -1, or the change at the vertex of the parabola where that is nearer.
+        /// -1, or the change at the vertex of the parabola if that is nearer.
         limit: f64,
-        /// What was given.
+        /// The resistance change.
         got: f64,
     },
 }
 
-/// The change when it leaves some resistance.
+/// The change, if some resistance remains.
 fn above_minus_one(got: f64) -> Result<f64, GageError> {
     match got > -1.0 {
         true => Ok(got),
@@ -81,8 +80,7 @@ fn positive(what: &'static str, got: f64) -> Result<f64, GageError> {
     }
 }
 
-/// Absolute temperature in kelvin of a temperature in degrees Fahrenheit,
-/// `T = (F + 459.67) / 1.8`.
+/// Absolute temperature in kelvin from degrees Fahrenheit, `T = (F + 459.67) / 1.8`.
 ///
 /// ```
 /// use torqcomp_dsp::gage::kelvin_from_fahrenheit;
@@ -96,10 +94,10 @@ pub fn kelvin_from_fahrenheit(temperature_f: f64) -> f64 {
 /// Apparent strain of a gage on a part that expands more than the gage,
 /// `ε_a = Δα ΔT`.
 ///
-/// `expansion_difference_per_k` is the part's linear expansion less the gage's
-/// (1/K); `temperature_change_k` the warming since the zero was taken (K).
-/// Thesis Appendix B, temperature correction (2), where the gage's own
-/// expansion is neglected. Valid while both coefficients are constant.
+/// `expansion_difference_per_k` is the part's linear expansion minus the gage's (1/K);
+/// `temperature_change_k` the temperature rise since zeroing (K). Thesis Appendix B, temperature
+/// correction (2), where the gage's own expansion is neglected. Valid while both coefficients are
+/// constant.
 ///
 /// ```
 /// use torqcomp_dsp::gage::apparent_strain;
@@ -214,10 +212,10 @@ impl Gage {
     /// Fractional resistance change `ΔR/R₀ = GF' ε + C₂' ε²` (Appendix B, table).
     ///
     /// # Errors
-    /// [`GageError::InvalidParameter`] for a strain or temperature that is not
-    /// usable; [`GageError::StrainOutOfRange`] at or past the vertex
-    /// `ε = -GF'/(2 C₂')`, where the parabola turns back and no gage follows it;
-    /// [`GageError::ResistanceChangeOutOfRange`] when the resistance vanishes.
+    /// [`GageError::InvalidParameter`] for an invalid strain or temperature;
+    /// [`GageError::StrainOutOfRange`] at or past the vertex `ε = -GF'/(2 C₂')`, where the parabola
+    /// turns back, unlike any gage; [`GageError::ResistanceChangeOutOfRange`] when the resistance
+    /// vanishes.
     ///
     /// ```
     /// use torqcomp_dsp::gage::{Gage, kelvin_from_fahrenheit};
@@ -241,16 +239,15 @@ impl Gage {
         above_minus_one(strain * (linear + quadratic * strain))
     }
 
-    /// Strain of a fractional resistance change, the inverse of
+    /// Strain from a fractional resistance change, the inverse of
     /// [`resistance_change`](Self::resistance_change).
     ///
-    /// `ε = 2ρ / (GF' + sgn(GF') √(GF'² + 4 C₂' ρ))` for `ρ = ΔR/R₀`: the root
-    /// of the quadratic on the branch through the unstressed state, in the form
-    /// that loses no digits near zero.
+    /// `ε = 2ρ / (GF' + sgn(GF') √(GF'² + 4 C₂' ρ))` for `ρ = ΔR/R₀`: the root of the quadratic on
+    /// the branch through the unstressed state, in the form without cancellation near zero.
     ///
     /// # Errors
     /// [`GageError::ResistanceChangeOutOfRange`] when no strain gives ρ or ρ ≤ -1;
-    /// [`GageError::InvalidParameter`] for values that are not usable.
+    /// [`GageError::InvalidParameter`] for invalid values.
     ///
     /// ```
     /// use torqcomp_dsp::gage::Gage;
@@ -280,8 +277,7 @@ impl Gage {
     /// at `temperature_k`, with no load on the part.
     ///
     /// # Errors
-    /// As [`strain`](Self::strain); [`GageError::InvalidParameter`] when R_B is
-    /// not above zero.
+    /// As for [`strain`](Self::strain); [`GageError::InvalidParameter`] when R_B is not above zero.
     ///
     /// ```
     /// use torqcomp_dsp::gage::Gage;
@@ -300,11 +296,11 @@ impl Gage {
         self.strain((bonded - free) / free, temperature_k)
     }
 
-    /// The gage glued to the part, with resistance R_B at the temperature at
-    /// which it was measured after the glue had set.
+    /// The gage bonded to the part, with resistance R_B at the temperature at which it was measured
+    /// after curing.
     ///
     /// # Errors
-    /// As [`prestrain`](Self::prestrain).
+    /// As for [`prestrain`](Self::prestrain).
     pub fn bond(
         self,
         bonded_resistance_ohm: f64,
@@ -320,11 +316,11 @@ impl Gage {
     }
 }
 
-/// A gage glued to the part; strains ε_x are counted from the bonded state.
+/// A gage bonded to the part; strains ε_x are relative to the bonded state.
 ///
-/// The prestrain ε_p is found once, at the bonding temperature T_B, and kept:
-/// temperature then acts through the law's coefficients, through the drift of
-/// R₀ and through [`apparent_strain`], which the caller adds to ε_x.
+/// The prestrain ε_p is computed once, at the bonding temperature T_B, and kept: temperature then
+/// acts through the law's coefficients, through the drift of R₀ and through [`apparent_strain`],
+/// which the caller adds to ε_x.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BondedGage {
     gage: Gage,
@@ -361,7 +357,7 @@ impl BondedGage {
     /// from ε_p to ε_p + ε_x: `R_B GF_cc ε_x` is exactly the resistance step.
     ///
     /// # Errors
-    /// As [`Gage::resistance_change`] at ε_p + ε_x.
+    /// As for [`Gage::resistance_change`] at ε_p + ε_x.
     ///
     /// ```
     /// use torqcomp_dsp::gage::Gage;
@@ -384,12 +380,12 @@ impl BondedGage {
 
     /// Gage factor in a constant-voltage circuit (Appendix B, eqs. B3 and B4).
     ///
-    /// `GF_cv = 2ΔR / ((2R_B + ΔR) ε_x)` with `ΔR = R_B ε_x GF_cc`, evaluated
-    /// as `2 GF_cc / (2 + ε_x GF_cc)`, which is the same and has its limit
-    /// GF_cc at ε_x = 0. For an active arm facing a fixed equal resistor.
+    /// `GF_cv = 2ΔR / ((2R_B + ΔR) ε_x)` with `ΔR = R_B ε_x GF_cc`, evaluated as the equivalent
+    /// `2 GF_cc / (2 + ε_x GF_cc)`, which has the limit GF_cc at ε_x = 0. For an active arm facing
+    /// a fixed equal resistor.
     ///
     /// # Errors
-    /// As [`gage_factor_constant_current`](Self::gage_factor_constant_current).
+    /// As for [`gage_factor_constant_current`](Self::gage_factor_constant_current).
     ///
     /// ```
     /// use torqcomp_dsp::gage::Gage;
@@ -408,7 +404,7 @@ impl BondedGage {
         Ok(2.0 * current / (2.0 + strain * current))
     }
 
-    /// Coefficients `[a, b, c]` of the change a bridge sees,
+    /// Coefficients `[a, b, c]` of the change seen by a bridge,
     /// `(R - R_B)/R_B = a + b ε_x + c ε_x²`.
     ///
     /// Expands [`resistance_ohm`](Self::resistance_ohm) about ε_p. `a` is the
@@ -431,21 +427,21 @@ impl BondedGage {
             .resistance_change(self.prestrain, self.bonding_temperature_k)?;
         let ratio = self.gage.unbonded_resistance_ohm / self.bonded_resistance_ohm;
         Ok([
-            // Differences first, so that nothing remains of the 1 in 1 + ρ.
+            // Differences first, to cancel the 1 in 1 + ρ exactly.
             ratio * (resistance_drift * (1.0 + now) + (now - at_bonding)),
             ratio * drift * (linear + 2.0 * quadratic * self.prestrain),
             ratio * drift * quadratic,
         ])
     }
 
-    /// Fractional change `ΔR/R_B` at strain ε_x and temperature T, without
-    /// drift of R₀: what the bridge sees of the gage.
+    /// Fractional change `ΔR/R_B` at strain ε_x and temperature T, without drift of R₀, as seen by
+    /// the bridge.
     ///
     /// `ΔR/R_B = (R₀/R_B) (ρ(ε_p + ε_x, T) - ρ(ε_p, T_B))` with ρ of
     /// [`Gage::resistance_change`].
     ///
     /// # Errors
-    /// As [`Gage::resistance_change`] at ε_p + ε_x.
+    /// As for [`Gage::resistance_change`] at ε_p + ε_x.
     ///
     /// ```
     /// use torqcomp_dsp::gage::Gage;
@@ -463,13 +459,12 @@ impl BondedGage {
 
     /// Resistance `R = R₀ (1 + τ) (1 + ρ(ε_p + ε_x, T))`, ohm.
     ///
-    /// τ (`resistance_drift`) is the fractional change of R₀ between T_B and T
-    /// from the maker's curve (thesis figure 8). At ε_x = 0, T = T_B, τ = 0
-    /// this is R_B.
+    /// τ (`resistance_drift`) is the fractional change of R₀ between T_B and T from the maker's
+    /// curve (thesis figure 8). At ε_x = 0, T = T_B, τ = 0 this is R_B.
     ///
     /// # Errors
-    /// As [`Gage::resistance_change`]; [`GageError::InvalidParameter`] for a
-    /// drift that is not finite.
+    /// As for [`Gage::resistance_change`]; [`GageError::InvalidParameter`] for a drift that is not
+    /// finite.
     ///
     /// ```
     /// use torqcomp_dsp::gage::Gage;

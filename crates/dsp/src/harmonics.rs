@@ -1,4 +1,4 @@
-//! Component torques at a fundamental and its orders, by least-squares sine fit.
+//! Torque components at a fundamental and its orders, by least-squares sine fit.
 //!
 //! The record is modelled as
 //!
@@ -6,10 +6,10 @@
 //! x(t) = c + Σ_k A_k cos(2π n_k f₁ t + φ_k)
 //! ```
 //!
-//! with all components fitted at once, so neither whole periods nor a window are needed
-//! (IEEE Std 1057, sine fit with known frequency, for several frequencies). About the middle of
-//! the record the sums over products of cosines have closed forms, the cosine and sine parts
-//! decouple, and only the right-hand side has to pass over the data.
+//! with all components fitted at once, so neither whole periods nor a window are needed (IEEE Std
+//! 1057, sine fit with known frequency, for several frequencies). With time counted from the middle
+//! of the record, the sums over products of cosines have closed forms and the cosine and sine parts
+//! decouple, so only the right-hand side needs a pass over the data.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use num_complex::Complex64;
@@ -26,41 +26,42 @@ use leftover::Leftover;
 
 pub use refine::refine_fundamental;
 
-/// Steps after which a rotating phasor is set anew, so that rounding does not add up.
+/// Steps after which a rotating phasor is reset, to limit the accumulation of rounding errors.
 const RESET_STEPS: usize = 512;
-/// Phasors that rotate side by side.
+/// Number of phasors that rotate in parallel.
 const TURNS: usize = 4;
-/// Variance of an amplitude over that of a well-separated one, above which components are refused.
+/// Variance of an amplitude, relative to that of a well-separated one, above which components are
+/// rejected.
 const LARGEST_INFLATION: f64 = 1e4;
 
 /// One component of a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Component {
-    /// Frequency over the fundamental.
+    /// Frequency relative to the fundamental.
     pub order: f64,
     /// Frequency in Hz.
     pub frequency_hz: f64,
-    /// Complex amplitude `A e^{jφ}` of `A cos(2πft + φ)`, `t` counted from the reference.
+    /// Complex amplitude `A e^{jφ}` of `A cos(2πft + φ)`, with `t` relative to the reference time.
     pub phasor: Complex64,
     /// Standard uncertainty of the amplitude, from the residual near the component.
     pub std_amplitude: f64,
-    /// Standard uncertainty of the phase in rad, that of a refined fundamental included; `None`
-    /// if the amplitude does not exceed its own uncertainty.
+    /// Standard uncertainty of the phase in rad, including that of a refined fundamental; `None` if
+    /// the amplitude does not exceed its own uncertainty.
     pub std_phase_rad: Option<f64>,
 }
 
-/// Components of a record and what they leave over.
+/// Components of a record and the residual of the fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Harmonics {
-    /// The constant part.
+    /// The constant component.
     pub mean: f64,
-    /// The components, in the order they were asked for.
+    /// The components, in the order requested.
     pub components: Vec<Component>,
-    /// Root mean square of what the fit leaves over.
+    /// RMS residual of the fit.
     pub residual_rms: f64,
 }
 
-/// A fundamental frequency and how sure it is.
+/// A fundamental frequency and its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fundamental {
     /// Frequency in Hz.
@@ -70,7 +71,7 @@ pub struct Fundamental {
 }
 
 impl Fundamental {
-    /// A fundamental that is known.
+    /// A known fundamental.
     #[must_use]
     pub fn given(frequency_hz: f64) -> Self {
         Self {
@@ -84,13 +85,13 @@ impl Fundamental {
 ///
 /// `start_s` is the time of the first sample; phases refer to time 0. The standard uncertainty of
 /// an amplitude is `√(S(f)/T)` for a residual of one-sided density `S(f)` near the component and a
-/// record of length `T`, times the inflation by components that are close together. A residual line
-/// that is not fitted counts with what it leaks to the component.
+/// record of length `T`, times the variance inflation due to closely spaced components. A residual
+/// line that is not fitted contributes through its leakage.
 ///
 /// # Errors
-/// [`Error::AboveNyquist`], [`Error::NotSeparable`] if the record is too short to tell two
-/// components (or one from the constant) apart, [`Error::TooShort`] for fewer samples than
-/// unknowns, [`Error::NotPositive`], [`Error::NonFinite`].
+/// [`Error::AboveNyquist`], [`Error::NotSeparable`] if the record is too short to resolve two
+/// components (or one from the constant), [`Error::TooShort`] for fewer samples than unknowns,
+/// [`Error::NotPositive`], [`Error::NonFinite`].
 ///
 /// ```
 /// use torqcomp_dsp::harmonics::{fit, Fundamental};
@@ -151,7 +152,7 @@ pub fn fit(
     })
 }
 
-/// The linear fit about the middle of a record, frequencies given.
+/// The linear fit about the middle of a record at given frequencies.
 struct SineFit {
     /// Angular steps `2πf/f_s`, rad per sample.
     steps: Vec<f64>,
@@ -165,7 +166,7 @@ struct SineFit {
 }
 
 impl SineFit {
-    /// The fit of the first samples of a record, `length` of them.
+    /// The fit to the first `length` samples of a record.
     fn solve(
         samples: &(impl SampleStore + ?Sized),
         length: usize,
@@ -218,7 +219,7 @@ impl SineFit {
         Complex64::new(self.even[k + 1], -self.odd[k])
     }
 
-    /// Variance of an amplitude per variance of white noise; `2/N` when all is well separated.
+    /// Variance of an amplitude per variance of white noise; `2/N` for well-separated components.
     fn variance_factor(&self, k: usize) -> f64 {
         let diagonal = |gram: &Cholesky<f64, Dyn>, index: usize, size: usize| {
             let mut unit = DVector::zeros(size);
@@ -229,7 +230,7 @@ impl SineFit {
         diagonal(&self.even_gram, k + 1, n + 1).max(diagonal(&self.odd_gram, k, n))
     }
 
-    /// What is left of samples from a place on.
+    /// Residuals of the samples from index `start`.
     fn residual(&self, start: usize, samples: &[f64]) -> Vec<f64> {
         let mut residual: Vec<f64> = samples.iter().map(|x| x - self.mean()).collect();
         for (k, &step) in self.steps.iter().enumerate() {
@@ -287,7 +288,7 @@ fn check(
     }
 }
 
-/// Names the first of the first samples that is no number.
+/// Reports the first non-finite value among the first samples.
 fn all_finite(samples: &(impl SampleStore + ?Sized), length: usize) -> Result<(), Error> {
     let mut found = None;
     samples.pass(0..length, &mut |start, piece| {
@@ -301,7 +302,7 @@ fn all_finite(samples: &(impl SampleStore + ?Sized), length: usize) -> Result<()
     }
 }
 
-/// The two closest of the frequencies, zero among them.
+/// The two closest frequencies, zero included.
 fn not_separable(orders: &[f64], fundamental_hz: f64, seconds: f64) -> Error {
     let mut sorted: Vec<f64> = orders.iter().map(|o| o * fundamental_hz).collect();
     sorted.push(0.0);
@@ -349,7 +350,7 @@ fn gram(steps: &[f64], length: usize) -> (DMatrix<f64>, DMatrix<f64>) {
     (even, odd)
 }
 
-/// Sums of samples that go by, times constant, cosines and sines about the middle.
+/// Running projections of a stream of samples onto constant, cosines and sines about the middle.
 struct Projections<'a> {
     steps: &'a [f64],
     length: usize,
@@ -397,7 +398,7 @@ impl<'a> Projections<'a> {
 /// Calls `visit(i, e^{jω(i − (N−1)/2)})` for the samples of a part.
 fn rotate(part: Range<usize>, length: usize, step: f64, mut visit: impl FnMut(usize, Complex64)) {
     let middle = 0.5 * (length - 1) as f64;
-    // A turn waits for the one before: several go side by side.
+    // Each rotation depends on the previous one, so several run in parallel.
     let ahead: [Complex64; TURNS] =
         std::array::from_fn(|k| Complex64::from_polar(1.0, step * k as f64));
     let advance = Complex64::from_polar(1.0, step * TURNS as f64);

@@ -1,7 +1,7 @@
-//! Signals of a reaction-torque stand: from recorded volts to the torque that acted.
+//! Signal processing for a reaction-torque stand: from recorded volts to the applied torque.
 //!
-//! The crate knows nothing of beams and inertias: the stand's response comes in as a function of
-//! frequency, records come in as slices of uniformly sampled `f64`. It does no file I/O.
+//! The crate has no model of beams and inertias: the stand's response is given as a function of
+//! frequency, and records are slices of uniformly sampled `f64`. It does no file I/O.
 //!
 //! ```text
 //! volts ── conversion (gage, bridge) ──► torque as recorded ── compensate ──► torque that acted

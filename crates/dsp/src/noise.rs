@@ -1,8 +1,8 @@
-//! What a compensation does to noise.
+//! Effect of a compensation on noise.
 //!
-//! Dividing a response out multiplies whatever the recorder adds by the inverse response, which
-//! grows with the square of frequency above the resonance. White noise of standard deviation `σ`
-//! leaves a filter with taps `g` with `σ √Σg²`; noise of density `S(f)` leaves it with density
+//! Inverting a response multiplies the recorder's noise by the inverse response, which grows with
+//! the square of frequency above the resonance. A filter with taps `g` turns white noise of
+//! standard deviation `σ` into `σ √Σg²`, and noise of density `S(f)` into density
 //! `S(f) |W(f) H⁻¹(f)|²`.
 
 use schemars::JsonSchema;
@@ -13,26 +13,25 @@ use crate::spectrum::Density;
 
 /// Sub-bands in which the record is compared with its noise floor.
 const SUB_BANDS: usize = 24;
-/// Mean density of a sub-band over the noise floor below which it carries nothing but noise: 3 dB.
+/// Mean density of a sub-band relative to the noise floor below which it contains only noise: 3 dB.
 const LOST_RATIO: f64 = 2.0;
-/// Fewest bins above the band that a noise floor is taken from.
+/// Minimum number of bins above the band for a noise floor.
 const FEWEST_FLOOR_BINS: usize = 16;
 
-/// Gain of a compensation for noise, known without any record.
+/// Noise gain of a compensation, known without a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseGain {
-    /// Standard deviation out over standard deviation in, for white noise up to half the rate:
-    /// `√Σg²`.
+    /// Output over input standard deviation for white noise up to the Nyquist frequency: `√Σg²`.
     pub white: f64,
-    /// Largest `|W H⁻¹|` and the frequency in Hz where it is reached.
+    /// Largest `|W H⁻¹|` and its frequency in Hz.
     pub largest: (f64, f64),
     /// `(frequency_hz, |W H⁻¹|)` at equally spaced frequencies from 0 to the band's top.
     pub curve: Vec<(f64, f64)>,
 }
 
 impl NoiseGain {
-    /// Noise gain of a filter and of a real factor over frequency beside it (`|_| 1.0` if there is none), the curve at `points`
-    /// frequencies (at least 2).
+    /// Noise gain of a filter combined with a real factor over frequency (`|_| 1.0` if there is none), with the curve
+    /// at `points` frequencies (at least 2).
     ///
     /// ```
     /// use std::sync::Arc;
@@ -100,15 +99,15 @@ pub struct RecordNoise {
 }
 
 impl RecordNoise {
-    /// Noise of a record with that density; `None` if there is too little room between the band
-    /// and half the rate to see the floor, or the density there is zero.
+    /// Noise of a record with this density; `None` if there is too little room between the band and
+    /// the Nyquist frequency to see the floor, or the density there is zero.
     ///
-    /// The floor is taken to be white: the same inside the band as above it.
+    /// The noise floor is assumed white: the same inside the band as above it.
     #[must_use]
     pub fn of(filter: &InverseFilter, density: &Density) -> Option<Self> {
         let band = filter.band();
         let nyquist_hz = 0.5 * band.sample_rate_hz();
-        // A window's leakage keeps clear of the edge, a recorder's own filter of the far end.
+        // Avoids the window's leakage at the edge and the recorder's own filter at the far end.
         let from_hz = band.end_hz() + 4.0 * density.step_hz;
         let to_hz = 0.98 * nyquist_hz;
         let mut above: Vec<f64> = density.between(from_hz, to_hz).map(|(_, v)| v).collect();
@@ -137,7 +136,7 @@ impl RecordNoise {
             floor_band_hz: [from_hz, to_hz],
             recorded_rms: power(&|f, _| floor_density * band.gain(f).powi(2)),
             compensated_rms: power(&|f, _| floor_density * filter.response(f).norm_sqr()),
-            // The first bins hold the mean, widened by the window.
+            // The first bins contain the mean, spread by the window.
             in_band_rms: power(&|f, v| {
                 if f < 2.0 * density.step_hz {
                     0.0
@@ -150,7 +149,7 @@ impl RecordNoise {
         })
     }
 
-    /// Start of the range up to the band's top in which the record is lost in noise.
+    /// Lowest frequency of the topmost range in which the record is lost in noise.
     #[must_use]
     pub fn lost_from_hz(&self, band_top_hz: f64) -> Option<f64> {
         self.lost_hz
@@ -173,7 +172,7 @@ impl RecordNoise {
     }
 }
 
-/// Sub-bands of `0..top_hz` whose mean density is within 3 dB of the floor, neighbours joined.
+/// Sub-bands of `0..top_hz` whose mean density is within 3 dB of the floor, adjacent ones merged.
 fn lost_ranges(density: &Density, top_hz: f64, floor: f64) -> Vec<[f64; 2]> {
     let width = top_hz / SUB_BANDS as f64;
     let mut ranges: Vec<[f64; 2]> = Vec::new();
@@ -240,7 +239,7 @@ mod tests {
         let filter = filter(2400.0);
         let noise = white(0.3, 200_000);
         let out = whole_record(&filter, &noise).unwrap();
-        // 200 000 samples in a band of a quarter of the rate fix an rms to about half a per cent.
+        // 200 000 samples in a quarter of the Nyquist range give an RMS to about half a per cent.
         let measured = rms(&out[1000..199_000]);
         let gain = NoiseGain::of(&filter, |_| 1.0, 2);
         assert!(
@@ -249,7 +248,7 @@ mod tests {
             gain.white * 0.3
         );
 
-        // Beside a signal, the floor above the band tells the same.
+        // With a signal present, the floor above the band gives the same result.
         let record: Vec<f64> = noise
             .iter()
             .enumerate()
@@ -281,7 +280,7 @@ mod tests {
             "nothing but noise: {:?}",
             lost.lost_hz
         );
-        // A line in the lowest twenty-fourth of the band: all above it is lost.
+        // A line in the lowest twenty-fourth of the band: everything above it is lost.
         let with_signal: Vec<f64> = record
             .iter()
             .enumerate()
@@ -299,7 +298,7 @@ mod tests {
 
     #[test]
     fn a_signal_above_the_band_is_seen() {
-        // The edge reaches from 2400 to 2880 Hz, and takes half of the amplitude in its middle.
+        // The edge reaches from 2400 to 2880 Hz, with an amplitude of one half in its middle.
         for (frequency_hz, rms) in [(5000.0, 2.0_f64.sqrt()), (2640.0, 0.5_f64.sqrt())] {
             let angle = |i: usize| std::f64::consts::TAU * frequency_hz * i as f64 / RATE;
             let noise = white(0.1, 100_000);

@@ -1,4 +1,4 @@
-//! Onsets of free ringing in a record.
+//! Onset of free decays in a record.
 
 use std::ops::Range;
 
@@ -6,25 +6,27 @@ use crate::peaks;
 
 /// Number of blocks of a record.
 const BLOCKS: usize = 400;
-/// Fewest samples of a block.
+/// Minimum number of samples per block.
 const LEAST_BLOCK: usize = 8;
-/// Swing of a block after a hit, over that of the blocks before it …
+/// Amplitude of a block after a hit, relative to that of the blocks before it …
 const RISE: f64 = 3.0;
-/// … and over the largest swing in the record.
+/// … and to the largest amplitude in the record.
 const SIZE: f64 = 0.15;
-/// Swing of a block that rings, over that of noise.
+/// Amplitude of a ringing block relative to the noise.
 const ABOVE: f64 = 2.0;
-/// Swing in the third quarter of a record, over that in the last, from which it still falls.
+/// Amplitude in the third quarter of a record, relative to that in the last, above which it is
+/// still decaying.
 const FALLS: f64 = 1.1;
-/// Mean square of the steps from sample to sample, over the variance, below which samples are no noise: 2 − 2 cos(2π/15).
+/// Mean-square difference of successive samples, relative to the variance, below which they are not noise: 2 − 2
+/// cos(2π/15).
 const ALIKE: f64 = 0.173;
-/// Blocks before a hit that it is compared with.
+/// Number of blocks before a hit with which it is compared.
 const BEFORE: usize = 4;
 /// Means in a period of the strongest line, among which a hit is looked for that samples do not show in their noise.
 const A_PERIOD: f64 = 6.0;
 
-/// The stretches of free ringing: each begins at the largest swing after a hit and ends before the next hit or at the end.
-/// Ringing from the first sample on is a stretch, too.
+/// The free decays: each begins at the largest amplitude after a hit and ends before the next hit or at the end.
+/// Ringing from the first sample on also counts.
 ///
 /// ```
 /// // Silence, then a decay from sample 500 on.
@@ -137,8 +139,8 @@ impl Onsets {
     }
 }
 
-/// Samples of a stretch up to twice the time after which its ringing is lost in the noise; all of them where the swing still
-/// falls at the end.
+/// Number of samples up to twice the time at which the decay is lost in the noise; all of them if it still decays at
+/// the end.
 ///
 /// ```
 /// // A decay of 0.01 a sample in a noise of ±0.01 is lost after about ln(100/2)/0.01 = 390 of 40 000 samples.
@@ -164,7 +166,7 @@ pub fn until_noise(samples: &[f64]) -> usize {
         median(&swings[2 * quarter..3 * quarter]),
         median(&swings[3 * quarter..]),
     );
-    // What swings slowly is no noise: it rings on when faster modes have died out.
+    // Slow oscillation is not noise: it outlasts the faster modes.
     let still_falls =
         before > FALLS * floor || is_slow(&samples[samples.len() - samples.len() / 4..]);
     let lost = swings.iter().rposition(|swing| *swing > ABOVE * floor);
@@ -174,8 +176,9 @@ pub fn until_noise(samples: &[f64]) -> usize {
     }
 }
 
-/// Whether neighbours are much alike: a sine of at least 15 samples a period in little noise.
-/// Of white noise the ratio is 2 (J. von Neumann, Ann. Math. Statist. 12 (1941) 367), of a sine `2 − 2 cos ω`.
+/// Whether successive samples are strongly correlated: a sine of at least 15 samples per period with little
+/// noise. The ratio is 2 for white noise (J. von Neumann, Ann. Math. Statist. 12 (1941) 367) and `2 − 2 cos ω`
+/// for a sine.
 fn is_slow(samples: &[f64]) -> bool {
     let mean = mean(samples);
     let power: f64 = samples.iter().map(|v| (v - mean).powi(2)).sum();
@@ -186,7 +189,7 @@ fn is_slow(samples: &[f64]) -> bool {
     steps < ALIKE * power
 }
 
-/// Half the difference of the largest and the smallest value.
+/// Half the peak-to-peak value.
 fn swing(block: &[f64]) -> f64 {
     let (low, high) = block
         .iter()
@@ -196,7 +199,7 @@ fn swing(block: &[f64]) -> f64 {
     0.5 * (high - low)
 }
 
-/// The sample farthest from the final level of the stretch, within its first blocks.
+/// The sample farthest from the final level of the interval, within its first blocks.
 fn peak_after(samples: &[f64], start: usize, end: usize, block: usize) -> usize {
     let tail = &samples[start + (end - start) * 3 / 4..end];
     let rest = mean(tail);
@@ -251,7 +254,8 @@ mod tests {
     #[test]
     fn a_slow_mode_rings_on_behind_a_fast_one() {
         let noise = |i: usize| 0.01 * ((i * 7919 % 1001) as f64 - 500.0) / 500.0;
-        // The slow one loses a tenth of its amplitude over the record, the fast one is gone after a hundredth.
+        // The slow one loses a tenth of its amplitude over the record, the fast one has decayed after a
+        // hundredth.
         let slow = |i: usize| 0.3 * (-2.5e-6 * i as f64).exp() * (0.05 * i as f64).cos();
         let fast = |i: usize| (-0.01 * i as f64).exp() * (0.4 * i as f64).cos();
         let both: Vec<f64> = (0..40_000).map(|i| fast(i) + slow(i) + noise(i)).collect();

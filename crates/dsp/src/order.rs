@@ -1,8 +1,8 @@
-//! Order by numbers.
+//! Sorting by a number.
 
-/// Sorts items by a number of each, the least first (`f64::total_cmp`); items with equal numbers stay in their order.
+/// Stable ascending sort of items by a number of each (`f64::total_cmp`).
 ///
-/// The sort itself is compiled once: of each type that it is generic in, it would take 5 kB of every binary.
+/// The sort itself is not generic: each instantiation would add 5 kB to every binary.
 ///
 /// ```
 /// let mut masses_kg = vec![("disc", 2.5), ("rod", 0.1), ("ring", 2.5)];
@@ -16,7 +16,7 @@ pub fn sort_by_number<T>(items: &mut Vec<T>, number: impl FnMut(&T) -> f64) {
     items.extend(sorted.filter_map(|place| taken[place].take()));
 }
 
-/// Places of numbers, that of the least first.
+/// Indices of the numbers in ascending order.
 #[inline(never)]
 fn order(numbers: &[f64]) -> Vec<usize> {
     let mut places: Vec<usize> = (0..numbers.len()).collect();

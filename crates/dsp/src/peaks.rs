@@ -1,22 +1,22 @@
-//! The strongest line of a record, as a start for a fit.
+//! Strongest spectral line of a record, as a start value for a fit.
 
 use std::ops::Range;
 
 /// A peak of a power spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
-    /// Its frequency in Hz.
+    /// Frequency in Hz.
     pub frequency_hz: f64,
-    /// Its full width at half its power, in Hz.
+    /// Full width at half power, in Hz.
     pub width_hz: f64,
-    /// Its power over the median power of the spectrum.
+    /// Power relative to the median power of the spectrum.
     pub prominence: f64,
 }
 
-/// Longest transform; longer records are truncated, which is enough for a start.
+/// Maximum transform length; longer records are truncated, which is enough for a start value.
 const LONGEST: usize = 1 << 20;
 
-/// What is transformed of a record.
+/// The part of a record that is transformed.
 #[must_use]
 pub fn looked_at(samples: &[f64]) -> &[f64] {
     &samples[..samples.len().min(LONGEST)]
@@ -73,7 +73,7 @@ pub fn strongest(samples: &[f64], rate_hz: f64, from_hz: f64, to_hz: f64) -> Opt
     })
 }
 
-/// Power from which on a bin is significant: `share` times the strongest and 50 times the median.
+/// Power above which a bin is significant: `share` times the strongest and 50 times the median.
 fn significant(power: &[f64], share: f64) -> f64 {
     let top = power[1..].iter().fold(0.0_f64, |m, p| m.max(*p));
     let mut sorted = power[1..].to_vec();
@@ -82,29 +82,29 @@ fn significant(power: &[f64], share: f64) -> f64 {
     (50.0 * *median).max(share * top)
 }
 
-/// Lengths over which bands of lines are looked for, each a quarter of the one before: what rings for a short time only is not
-/// seen over a long one.
+/// Number of record lengths for the search for lines, each a quarter of the previous one: a short-lived mode does not
+/// show over a long one.
 const LENGTHS: usize = 4;
-/// Fewest samples for that.
+/// Shortest of these lengths, in samples.
 const SHORTEST: usize = 1 << 12;
-/// Bins beside a line that belong to it.
+/// Bins on either side that belong to a line.
 const BINS: f64 = 2.0;
-/// Lines within that part of their frequency are the same over all lengths.
+/// Relative frequency difference within which lines of different lengths are the same.
 const SAME: f64 = 0.01;
-/// The window of Blackman and Harris, with sidelobes of −92 dB (F. J. Harris, Proc. IEEE 66 (1978), 51).
+/// Blackman–Harris window, with sidelobes of −92 dB (F. J. Harris, Proc. IEEE 66 (1978), 51).
 const WINDOW: [f64; 4] = [0.358_75, -0.488_29, 0.141_28, -0.011_68];
 
-/// A line of a free decay, or several that touch.
+/// A line of a free decay, or several overlapping ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    /// Where its power is significant, in cycles per sample.
+    /// Range of significant power, in cycles per sample.
     pub place: Range<f64>,
-    /// First samples of the record over which it is seen.
+    /// Number of leading samples of the record over which it is visible.
     pub over: usize,
 }
 
 impl Line {
-    /// The line with what lies beside it up to that part of its frequency, and at least two bins.
+    /// The line widened by the fraction `beside` of its frequency, and by at least two bins.
     #[must_use]
     pub fn band(&self, beside: f64) -> Range<f64> {
         let bins = BINS / self.over as f64;
@@ -118,8 +118,8 @@ impl Line {
     }
 }
 
-/// Everything in a free decay that is significant by [`highest`], as it is seen over its first samples, from most to fewest
-/// of them. Lines are seen through a window, as what leaks of a line that stops would be taken for others.
+/// All lines of a free decay that are significant as in [`highest`], over a decreasing number of its first samples.
+/// They are windowed, as the leakage of a truncated line would be mistaken for others.
 #[must_use]
 pub fn lines(samples: &[f64], share: f64) -> Vec<Line> {
     let mut all = Vec::new();
@@ -149,7 +149,7 @@ pub fn lines(samples: &[f64], share: f64) -> Vec<Line> {
     all
 }
 
-/// Over how many samples the line is seen that rings for the shortest time.
+/// Number of samples over which the shortest-lived line is visible.
 #[must_use]
 pub fn briefest(lines: &[Line]) -> Option<usize> {
     let is_new = |line: &&Line| {
@@ -159,7 +159,7 @@ pub fn briefest(lines: &[Line]) -> Option<usize> {
     lines.iter().filter(is_new).map(|line| line.over).min()
 }
 
-/// Samples without their mean, within a window.
+/// Samples without their mean, windowed.
 fn tapered(samples: &[f64]) -> Vec<f64> {
     let count = samples.len() as f64;
     let weight = |i: usize| {
@@ -219,7 +219,7 @@ mod tests {
                 "{found:?}"
             );
         }
-        // 0.1 exp(−0.001 i) is below the noise in the middle of 18 750 samples, and not in that of 4 687.
+        // 0.1 exp(−0.001 i) is below the noise in the middle of 18 750 samples, but not in that of 4 687.
         assert!(briefest(&found).unwrap() < 75_000, "{found:?}");
         let long: Vec<Line> = lines(&record[..1 << 17], 1e-6)
             .into_iter()

@@ -54,19 +54,19 @@ impl Recorder {
         })
     }
 
-    /// Output per input at zero frequency.
+    /// Static gain, output per input.
     #[must_use]
     pub fn gain(&self) -> f64 {
         self.gain
     }
 
-    /// Whether it changes nothing but the gain: no low-pass, no delay.
+    /// Whether it has only a gain, without low-pass or delay.
     #[must_use]
     pub fn is_ideal(&self) -> bool {
         self.low_pass.is_none() && self.delay_s == 0.0
     }
 
-    /// Response without its static gain: `L(f) e^{−j2πfτ}`, with `L(0) = 1`.
+    /// Response normalised by the static gain: `L(f) e^{−j2πfτ}`, with `L(0) = 1`.
     ///
     /// ```
     /// use torqcomp_dsp::recorder::{LowPass, Recorder};
@@ -87,7 +87,7 @@ impl Recorder {
         low_pass * Complex64::from_polar(1.0, turn)
     }
 
-    /// Phase of [`Recorder::response`] in rad, continuous over frequency from 0 at rest.
+    /// Unwrapped phase of [`Recorder::response`] in rad, 0 at DC.
     ///
     /// ```
     /// use torqcomp_dsp::recorder::Recorder;
@@ -120,7 +120,7 @@ impl LowPass {
         self.factors(frequency_hz).product()
     }
 
-    /// The response of each pole. Each stays clear of the negative real axis.
+    /// The response of each pole; none crosses the negative real axis.
     fn factors(&self, frequency_hz: f64) -> impl Iterator<Item = Complex64> {
         let s = Complex64::new(0.0, frequency_hz / self.cutoff_hz);
         let order = f64::from(self.order);

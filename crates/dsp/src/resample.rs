@@ -1,4 +1,4 @@
-//! Bringing samples with irregular time stamps onto a uniform grid.
+//! Resampling of samples with irregular time stamps onto a uniform grid.
 
 use std::collections::VecDeque;
 
@@ -7,17 +7,18 @@ use serde::Serialize;
 
 use crate::Error;
 
-/// Points that a value is interpolated from where the stamps are close enough.
+/// Number of interpolation points where the stamps are close enough.
 const POINTS: usize = 8;
-/// Longest step, in grid steps, that is interpolated as a curve; anything longer is a gap.
+/// Longest step, in grid steps, that is interpolated by a polynomial; anything longer is a gap.
 const LONGEST_STEP: f64 = 1.5;
 /// Longest gap that is bridged, in grid steps.
 const LONGEST_GAP: f64 = 10_000.0;
-/// Grid samples for each recorded one, and in any case, beyond which nothing is bridged any more.
+/// Maximum number of grid samples per recorded one, and maximum in any case, up to which gaps are
+/// bridged.
 const MOST_PER_SAMPLE: usize = 10;
-/// Gaps whose times are noted.
+/// Maximum number of listed gaps.
 const MOST_NOTED: usize = 10_000;
-/// Distance of a stamp from the grid, in grid steps, that is nothing but rounding.
+/// Distance of a stamp from the grid, in grid steps, attributed to rounding.
 const COINCIDENT: f64 = 1e-6;
 
 /// What a resampling did.
@@ -42,22 +43,22 @@ pub struct Resampled {
     pub bridged_gaps: Vec<BridgedGap>,
 }
 
-/// A gap that was bridged.
+/// A bridged gap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BridgedGap {
-    /// Time of the sample before it, in s after the grid's first.
+    /// Time of the preceding sample, in s from the start of the grid.
     pub from_s: f64,
-    /// Time of the sample behind it.
+    /// Time of the following sample.
     pub to_s: f64,
-    /// Grid samples within it.
+    /// Number of grid samples in the gap.
     pub samples: usize,
 }
 
 /// Interpolates stamped samples on the grid `t₀ + k Δt`, `t₀` being the first stamp.
 ///
-/// Between close stamps the polynomial through the eight nearest points is used (four on each
-/// side, Lagrange's formula), across a gap a straight line. It is a stream: results come out as
-/// soon as the points after them are there.
+/// Between close stamps the polynomial through the eight nearest points is used (four on each side,
+/// Lagrange interpolation), across a gap a straight line. Streaming: results are output as soon as
+/// the points after them are available.
 #[derive(Debug)]
 pub struct Resampler {
     step_s: f64,
@@ -107,7 +108,7 @@ impl Resampler {
     }
 
     /// A resampler to a grid `start_s + k step_s` that begins at or after the first stamp, so that
-    /// several channels come onto one grid.
+    /// several channels share one grid.
     ///
     /// # Errors
     /// [`Error::NotPositive`] for a step that is not positive.
@@ -136,8 +137,8 @@ impl Resampler {
     ///
     /// # Errors
     /// [`Error::TimeNotIncreasing`] if the stamp lies before the last one, [`Error::GapTooLong`] if
-    /// it follows a gap of more than 10 000 steps, or if by then the grid holds ten times as many
-    /// samples as were recorded. A repeated stamp is left out and counted.
+    /// it follows a gap of more than 10 000 steps, or if the grid would have ten times as many
+    /// samples as were recorded. A repeated stamp is skipped and counted.
     pub fn push(&mut self, time_s: f64, value: f64, out: &mut Vec<f64>) -> Result<(), Error> {
         let index = self.done.samples_in;
         self.done.samples_in += 1;
@@ -158,7 +159,7 @@ impl Resampler {
             Some(&(last, _)) => self.note_step(last, time_s)?,
         }
         self.points.push_back((time_s, value));
-        // Values up to the middle of the eight points have all their neighbours.
+        // All values up to the middle of the eight points have all their neighbours.
         while self.points.len() >= POINTS && self.grid_time() < self.points[POINTS / 2].0 {
             self.emit(out);
         }
@@ -171,7 +172,7 @@ impl Resampler {
         Ok(())
     }
 
-    /// Gives out the rest up to the last stamp.
+    /// Outputs the rest up to the last stamp.
     pub fn finish(mut self, out: &mut Vec<f64>) -> Resampled {
         if let Some(&(last, _)) = self.points.back() {
             while self.grid_time() <= last + COINCIDENT * self.step_s {
@@ -208,7 +209,7 @@ impl Resampler {
         Ok(())
     }
 
-    /// Notes a gap between two times after the grid's first.
+    /// Records a gap between two times relative to the start of the grid.
     fn note_gap(&mut self, from_s: f64, to_s: f64) {
         let first = (from_s / self.step_s + COINCIDENT).floor() + 1.0;
         let end = (to_s / self.step_s - COINCIDENT).ceil();
@@ -244,7 +245,7 @@ impl Resampler {
         self.done.samples_out += 1;
     }
 
-    /// The sample whose stamp is the grid time itself, but for rounding.
+    /// The sample whose stamp equals the grid time within rounding.
     fn stamped(&self, after: usize, time_s: f64) -> Option<f64> {
         let first = after.saturating_sub(1);
         let near = |point: &&(f64, f64)| (point.0 - time_s).abs() <= COINCIDENT * self.step_s;
@@ -260,7 +261,7 @@ impl Resampler {
         x0 + (x1 - x0) * (time_s - t0) / (t1 - t0)
     }
 
-    /// Lagrange polynomial through up to four points on either side that no gap separates.
+    /// Lagrange polynomial through up to four points on either side not separated by a gap.
     fn polynomial(&self, after: usize, time_s: f64) -> f64 {
         let mut first = after - 1;
         while first > 0 && after - first < POINTS / 2 && !self.is_gap(first) {
@@ -314,7 +315,7 @@ mod tests {
         assert_eq!(done.gaps, 0);
         assert!(done.largest_jitter > 0.2 && done.largest_jitter < 0.45);
         for (k, x) in out.iter().enumerate() {
-            // Four points on one side only within four samples of an end.
+            // One-sided interpolation only within four samples of an end.
             let bound = if (4..out.len() - 4).contains(&k) {
                 5e-6
             } else {
@@ -344,7 +345,7 @@ mod tests {
             samples,
         };
         assert_eq!(done.bridged_gaps, [gap(3.0, 7.0, 3)]);
-        // Counted from the first stamp, and between stamps beside the grid.
+        // Relative to the first stamp, and between stamps off the grid.
         let stamps = [10.0, 11.1, 13.9, 15.0, 18.0];
         let (_, done) = resample(&stamps, |t| t, 1.0);
         let [first, second] = done.bridged_gaps[..] else {
@@ -365,7 +366,7 @@ mod tests {
             matches!(refused, Err(Error::GapTooLong { .. })),
             "{refused:?}"
         );
-        // Nor are many gaps that each would do.
+        // Nor are many gaps, each of them acceptable.
         let mut resampler = Resampler::new(1e-3).unwrap();
         let refused =
             (0..1000).find_map(|i| resampler.push(5.0 * f64::from(i), 0.0, &mut out).err());

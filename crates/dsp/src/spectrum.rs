@@ -6,9 +6,9 @@ use crate::Error;
 
 /// Power spectrum summed over Hann-windowed blocks of one length.
 ///
-/// The window is applied to the transform of the plain block: multiplying by a Hann window is the
-/// same as `X'[k] = ½X[k] − ¼X[k−1] − ¼X[k+1]` (F. J. Harris, Proc. IEEE 66 (1978), 51), so a
-/// transform that is made for another purpose can be used.
+/// The window is applied to the transform of the unwindowed block: a Hann window is equivalent to
+/// `X'[k] = ½X[k] − ¼X[k−1] − ¼X[k+1]` (F. J. Harris, Proc. IEEE 66 (1978), 51), so an existing
+/// transform can be reused.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PowerSum {
     block_length: usize,
@@ -17,7 +17,7 @@ pub struct PowerSum {
 }
 
 impl PowerSum {
-    /// An empty sum for blocks of that even length.
+    /// An empty sum for blocks of an even length.
     #[must_use]
     pub fn new(block_length: usize) -> Self {
         Self {
@@ -30,7 +30,7 @@ impl PowerSum {
     /// Adds the transform (bins `0..=block_length/2`) of an unwindowed block.
     ///
     /// # Panics
-    /// If the number of bins does not fit the block length.
+    /// If the number of bins does not match the block length.
     pub fn add_hann(&mut self, spectrum: &[Complex64]) {
         assert_eq!(spectrum.len(), self.sum.len(), "bins of one block length");
         let last = spectrum.len() - 1;
@@ -43,7 +43,7 @@ impl PowerSum {
         self.blocks += 1;
     }
 
-    /// Adds all half-overlapping blocks that fit into the samples, the mean taken off each.
+    /// Adds all half-overlapping blocks of the samples, each without its mean.
     pub fn add_samples(&mut self, samples: &[f64]) {
         let length = self.block_length;
         let transform = torqcomp_fourier::forward(length);
@@ -70,7 +70,7 @@ impl PowerSum {
         self.blocks += other.blocks;
     }
 
-    /// Empties the sum.
+    /// Clears the sum.
     pub fn clear(&mut self) {
         self.sum.fill(0.0);
         self.blocks = 0;
@@ -82,7 +82,7 @@ impl PowerSum {
         if self.blocks == 0 {
             return None;
         }
-        // Mean square of the Hann window is 3/8; two sides are folded into one.
+        // The mean square of the Hann window is 3/8; the two-sided spectrum is folded.
         let scale = 2.0 / (sample_rate_hz * 0.375 * self.block_length as f64 * self.blocks as f64);
         let mut values: Vec<f64> = self.sum.iter().map(|power| power * scale).collect();
         let last = values.len() - 1;
@@ -96,19 +96,19 @@ impl PowerSum {
     }
 }
 
-/// Welch's density of a record that comes in pieces, in bounded memory: the same as [`welch`] of the whole, to rounding.
+/// Welch's density of a streamed record, in bounded memory: equal to [`welch`] of the whole within rounding.
 #[derive(Debug, Clone)]
 pub struct StreamedPower {
     sum: PowerSum,
-    /// Samples of blocks that are not complete.
+    /// Samples of incomplete blocks.
     pending: Vec<f64>,
 }
 
-/// Blocks that a [`StreamedPower`] transforms at once.
+/// Number of blocks transformed at once.
 const BLOCKS_AT_ONCE: usize = 16;
 
 impl StreamedPower {
-    /// No samples yet, for blocks of that even length.
+    /// An empty sum for blocks of an even length.
     #[must_use]
     pub fn new(block_length: usize) -> Self {
         Self {
@@ -143,12 +143,12 @@ impl StreamedPower {
         }
         self.sum.add_samples(&self.pending);
         let blocks = (self.pending.len() - length) / half + 1;
-        // What the next block begins with.
+        // Keep the start of the next block.
         self.pending.drain(..blocks * half);
     }
 
-    /// The density of all samples; of a record shorter than two blocks from blocks of at most half of it, and `None` if there
-    /// are fewer than 8 samples.
+    /// The density of all samples; a record shorter than two blocks uses blocks of at most half its length, and fewer
+    /// than 8 samples give `None`.
     #[must_use]
     pub fn density(&self, sample_rate_hz: f64) -> Option<Density> {
         let mut whole = self.clone();
@@ -165,24 +165,24 @@ impl StreamedPower {
 /// One-sided power spectral density, unit²/Hz, at equally spaced frequencies from zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Density {
-    /// Distance of the frequencies, in Hz.
+    /// Frequency step, in Hz.
     pub step_hz: f64,
     /// The density at `0, step_hz, 2 step_hz, …`.
     pub values: Vec<f64>,
-    /// Blocks that were averaged.
+    /// Number of averaged blocks.
     pub blocks: usize,
 }
 
 impl Density {
-    /// Median over mean of a line of noise, averaged over these blocks: a chi-squared quantity with 2 degrees of freedom
-    /// a block (E. B. Wilson, M. M. Hilferty, PNAS 17 (1931), 684).
+    /// Ratio of median to mean of a noise line averaged over these blocks: chi-squared with 2 degrees of freedom per
+    /// block (E. B. Wilson, M. M. Hilferty, PNAS 17 (1931), 684).
     #[must_use]
     pub fn median_over_mean(&self) -> f64 {
         let freedom = 2.0 * self.blocks as f64;
         (1.0 - 2.0 / (9.0 * freedom)).powi(3)
     }
 
-    /// The density of a record whose power is `factor` times this one's.
+    /// The density for a power scaled by `factor`.
     #[must_use]
     pub fn scaled(mut self, factor: f64) -> Self {
         self.values.iter_mut().for_each(|value| *value *= factor);
@@ -201,7 +201,7 @@ impl Density {
     }
 }
 
-/// Density of a record by Welch's method: Hann windows, half overlapping, the mean taken off each.
+/// Density of a record by Welch's method: Hann windows, half overlapping, each without its mean.
 ///
 /// Source: P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967), 70.
 ///
@@ -227,7 +227,7 @@ pub fn welch(samples: &[f64], sample_rate_hz: f64, block_length: usize) -> Resul
         .expect("the record holds at least one block"))
 }
 
-/// Refuses what no density can be taken of.
+/// Rejects input without a density.
 fn check(samples: &[f64], sample_rate_hz: f64, block_length: usize) -> Result<(), Error> {
     if !(sample_rate_hz > 0.0 && sample_rate_hz.is_finite()) {
         return Err(Error::NotPositive {
@@ -253,11 +253,12 @@ fn check(samples: &[f64], sample_rate_hz: f64, block_length: usize) -> Result<()
 
 /// Density of a record as by [`welch`], with the square of the Hann window, `sin⁴`.
 ///
-/// Its leakage falls with the tenth power of the distance, that of the Hann window with the sixth: what a resonance
-/// leaks then stays below the noise. The main lobe is half as wide again. The mean square of `sin⁴` is 35/128.
+/// Its leakage falls with the tenth power of the distance, that of the Hann window with the sixth, so that the
+/// leakage of a resonance stays below the noise. The main lobe is half as wide again. The mean square of `sin⁴` is
+/// 35/128.
 ///
 /// # Errors
-/// As [`welch`].
+/// As for [`welch`].
 ///
 /// ```
 /// use torqcomp_dsp::spectrum::welch_steep;
@@ -313,7 +314,7 @@ pub fn welch_steep(
 mod tests {
     use super::*;
 
-    /// Direct transform of the windowed block: the definition, term by term.
+    /// Direct transform of the windowed block by definition, term by term.
     fn slow_hann_power(block: &[f64]) -> Vec<f64> {
         let n = block.len() as f64;
         (0..=block.len() / 2)

@@ -1,15 +1,15 @@
-//! Samples that can be gone through several times, wherever they are kept.
+//! Samples that can be read several times, wherever they are stored.
 
 use std::ops::Range;
 
 use crate::Error;
 
-/// Samples that are read in pieces, as often as needed.
+/// Samples read in pieces, as often as needed.
 pub trait SampleStore {
-    /// How many there are.
+    /// Number of samples.
     fn count(&self) -> usize;
 
-    /// Calls `visit` with the pieces of a part in their order: the place of the first sample of each, and its samples.
+    /// Calls `visit` with the pieces of a part in order: index of the first sample, and the samples.
     ///
     /// # Errors
     /// [`Error::Unreadable`] if they can no longer be read.
@@ -26,7 +26,7 @@ pub trait SampleStore {
     }
 }
 
-/// Samples of a piece.
+/// Samples per piece.
 const PIECE: usize = 1 << 14;
 
 impl SampleStore for [f64] {

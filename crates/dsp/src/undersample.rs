@@ -1,34 +1,34 @@
-//! A rate below twice the frequencies of a record whose lines lie in a few narrow bands.
+//! Undersampling of a record whose lines lie in a few narrow bands.
 //!
-//! Of one sample in D, a line of f cycles a sample looks like one of `|f − k/D|` below `1/(2D)`. Where everything outside
-//! the bands is filtered out before, and these images of the bands lie apart, nothing else is mixed with the lines: the
-//! samples are still those of the lines at their own frequencies and decay rates, and only fewer. (R. G. Vaughan, N. L.
-//! Scott, D. R. White, IEEE Trans. Signal Process. 39 (1991), 1973.)
+//! When every D-th sample is kept, a line of f cycles per sample aliases to `|f − k/D|` below `1/(2D)`. If everything
+//! outside the bands is filtered out first, and the images of the bands do not overlap, nothing else is mixed with the
+//! lines: the samples still represent the lines at their own frequencies and decay rates, only fewer of them. (R. G.
+//! Vaughan, N. L. Scott, D. R. White, IEEE Trans. Signal Process. 39 (1991), 1973.)
 
 use std::ops::{Range, RangeInclusive};
 
 use crate::decimate::{Decimated, window_gain, windowed_sinc};
 use crate::{Error, dot, sort_by_number};
 
-/// From the end of a band to where the filter passes nothing (80 dB), times the factor and twice the reach (J. F. Kaiser, in
-/// Kuo, Kaiser (eds.), System Analysis by Digital Computer, 1966).
+/// Transition width of the filter (to 80 dB), times the factor and twice the reach (J. F. Kaiser, in Kuo, Kaiser
+/// (eds.), System Analysis by Digital Computer, 1966).
 const EDGE: f64 = 5.0;
 
-/// Bands, in cycles per sample, and a factor for which their images lie apart.
+/// Bands, in cycles per sample, and a factor for which their images do not overlap.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Undersampling {
-    /// Samples of the record per sample.
+    /// Decimation factor.
     pub factor: usize,
     /// Half-length of the filter in samples of the result.
     pub reach: usize,
-    /// What is kept, by rising frequency.
+    /// Bands kept, in ascending order.
     pub bands: Vec<Range<f64>>,
 }
 
 impl Undersampling {
-    /// The largest of some factors for which the images of bands, in cycles per sample, lie apart, with a filter that reaches
-    /// so many samples of the result to either side: the longer, the narrower are its edges, and the more bands fit in. `None`
-    /// if there is none.
+    /// The largest of some factors for which the images of bands, in cycles per sample, do not overlap, with a filter
+    /// that reaches `reach` samples of the result to either side: a longer filter has narrower edges, so that more
+    /// bands fit. `None` if there is none.
     ///
     /// ```
     /// use torqcomp_dsp::undersample::Undersampling;
@@ -52,18 +52,18 @@ impl Undersampling {
             .find(Self::is_apart)
     }
 
-    /// Samples that the filter reaches to either side.
+    /// Half-length of the filter in samples.
     #[must_use]
     pub fn half(&self) -> usize {
         self.reach * self.factor
     }
 
-    /// From the end of a band to where the filter passes nothing.
+    /// Transition width of the filter.
     fn edge(&self) -> f64 {
         EDGE / (2 * self.half()) as f64
     }
 
-    /// Whether the images of all bands, with the edges of the filter, lie apart.
+    /// Whether the images of all bands, including the filter edges, do not overlap.
     fn is_apart(&self) -> bool {
         let edge = self.edge();
         let images = self.bands.iter().map(|band| {
@@ -80,7 +80,7 @@ impl Undersampling {
         !images.is_empty() && images.windows(2).all(|pair| pair[0].end <= pair[1].start)
     }
 
-    /// The samples, filtered by a symmetrical filter, where it lies within the record.
+    /// The samples through a symmetrical filter, where it lies within the record.
     ///
     /// # Errors
     /// [`Error::TooShort`] if fewer than two samples would remain.
@@ -121,16 +121,16 @@ impl Undersampling {
     }
 }
 
-/// Zone of half a lower rate that a frequency lies in, from 0.
+/// Nyquist zone of a frequency at the lower rate, from 0.
 fn zone(frequency: f64, factor: usize) -> usize {
     (2.0 * factor as f64 * frequency).floor() as usize
 }
 
-/// What a band looks like in samples, if it lies within one zone of half their rate, and the way back from there; all in
-/// cycles per sample.
+/// Image of a band in the decimated samples, if it lies within one Nyquist zone, and the map back to the original
+/// frequency; all in cycles per sample.
 pub fn folded(band: &Range<f64>) -> (Range<f64>, impl Fn(f64) -> f64 + use<>) {
     let zone = zone(band.start, 1);
-    // The same both ways but for the sign.
+    // The same in both directions except for the sign.
     let turn = move |frequency: f64, sign: f64| match zone.is_multiple_of(2) {
         true => frequency - sign * 0.5 * zone as f64,
         false => 0.5 * (zone + 1) as f64 - frequency,
@@ -140,7 +140,7 @@ pub fn folded(band: &Range<f64>) -> (Range<f64>, impl Fn(f64) -> f64 + use<>) {
     (start.min(end)..start.max(end), back)
 }
 
-/// Bands by rising frequency; those that are closer than that are one.
+/// Bands in ascending order, with those closer than `closest` merged.
 fn joined(bands: &[Range<f64>], closest: f64) -> Vec<Range<f64>> {
     let mut sorted = bands.to_vec();
     sort_by_number(&mut sorted, |band| band.start);

@@ -1,19 +1,19 @@
-//! Derivatives averaged over a smooth window, without differences of samples.
+//! Derivatives averaged over a smooth window, without finite differences.
 //!
-//! An equation such as `T = J θ'' + f θ' + C` holds at every moment, so it also holds averaged with a weight φ that is zero
-//! at both ends of a window. Integration by parts then moves the derivatives from the record to the weight:
-//! `∫φ θ'' dt = ∫φ'' θ dt`. All terms have the same weight, so none is attenuated or shifted relative to another, unlike with
-//! filtered differences (modulating functions: M. Shinbrot, On the analysis of linear and nonlinear systems, Trans. ASME 79
-//! (1957), 547).
+//! An equation such as `T = J θ'' + f θ' + C` holds at every moment, so it also holds averaged with a weight φ that is
+//! zero at both ends of a window. Integration by parts then moves the derivatives from the record to the weight:
+//! `∫φ θ'' dt = ∫φ'' θ dt`. All terms have the same weight, so none is attenuated or shifted relative to another,
+//! unlike with filtered differences (modulating functions: M. Shinbrot, On the analysis of linear and nonlinear
+//! systems, Trans. ASME 79 (1957), 547).
 
 use crate::Error;
 
 /// Power of the weight `φ(x) = (1 − x²)ᵖ`: its derivatives up to the fifth are zero at the ends.
 const POWER: i32 = 6;
-/// Fewest samples from the middle of the window to its end.
+/// Minimum half-length of the window in samples.
 const LEAST_HALF: usize = 4;
 
-/// A window that slides over a record.
+/// A sliding window over a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Window {
     half: usize,
@@ -81,7 +81,7 @@ impl Window {
         Ok(Self { half, weights })
     }
 
-    /// Samples from the middle to the end.
+    /// Half-length in samples.
     #[must_use]
     pub fn half(&self) -> usize {
         self.half
@@ -91,7 +91,7 @@ impl Window {
     /// sample.
     ///
     /// # Panics
-    /// If the window does not lie within the record, or the order is higher.
+    /// If the window extends beyond the record, or the order is higher.
     #[must_use]
     pub fn at(&self, samples: &[f64], centre: usize, order: usize) -> f64 {
         let part = &samples[centre - self.half..=centre + self.half];
@@ -103,7 +103,7 @@ impl Window {
         if order == 1 { -sum } else { sum }
     }
 
-    /// The averages at every sample with a whole window, from sample [`Window::half`] on.
+    /// The averages at every sample with a complete window, from sample [`Window::half`] on.
     #[must_use]
     pub fn slide(&self, samples: &[f64], order: usize) -> Vec<f64> {
         (self.half..samples.len().saturating_sub(self.half))
@@ -135,10 +135,10 @@ impl Window {
     }
 }
 
-/// Variance of white noise on a smooth record, from its fourth differences: those of a smooth signal vanish, those of noise
-/// have 70 times its variance (1² + 4² + 6² + 4² + 1²).
+/// Variance of white noise on a smooth record, from its fourth differences: those of a smooth signal vanish, those of
+/// noise have 70 times its variance (1² + 4² + 6² + 4² + 1²).
 ///
-/// `None` for fewer than eight samples. From the median, so single jumps do not matter.
+/// `None` for fewer than eight samples. Based on the median, so isolated jumps do not matter.
 ///
 /// ```
 /// // A straight line has none.
@@ -156,7 +156,7 @@ pub fn white_noise_variance(samples: &[f64]) -> Option<f64> {
         .collect();
     let middle = sizes.len() / 2;
     let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-    // The median size of a normal variable is 0.6745 standard deviations.
+    // The median magnitude of a normal variable is 0.6745 standard deviations.
     Some((*median / 0.674_489_75).powi(2) / 70.0)
 }
 
@@ -164,7 +164,8 @@ pub fn white_noise_variance(samples: &[f64]) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// ∫φ cos = Re of the transform of φ: both derivatives of a sine must carry the same factor.
+    /// ∫φ cos is the real part of the transform of φ: both derivatives of a sine must have the same
+    /// factor.
     #[test]
     fn every_order_of_a_sine_is_damped_alike() {
         let rate_hz = 1000.0;

@@ -1,16 +1,16 @@
-//! Low-pass without phase, for whole records.
+//! Zero-phase low-pass for whole records.
 
 use crate::Error;
 
-/// Passes a record through a Butterworth low-pass of that order forwards and backwards: the factor is
-/// `1/(1 + (f/f_c)²ⁿ)` at every frequency, without phase, −6 dB at f_c.
+/// Applies a Butterworth low-pass of this order forwards and backwards: gain `1/(1 + (f/f_c)²ⁿ)` at
+/// every frequency, zero phase, −6 dB at f_c.
 ///
-/// The ends are continued by their reflection about the first and last sample, so that a trend
-/// does not ring there.
+/// The ends are extended by reflection about the first and last sample, so that a trend does not ring
+/// there.
 ///
 /// # Errors
-/// [`Error::TooShort`] for fewer than two samples, [`Error::NotPositive`] for a rate or a corner
-/// that is not.
+/// [`Error::TooShort`] for fewer than two samples, [`Error::NotPositive`] for a rate or corner that
+/// is not positive.
 ///
 /// ```
 /// // A constant passes as it is.
@@ -43,7 +43,7 @@ pub fn low_pass(
     padded.extend((1..=pad).rev().map(|i| 2.0 * first - samples[i]));
     padded.extend_from_slice(samples);
     padded.extend((1..=pad).map(|i| 2.0 * last - samples[count - 1 - i]));
-    // What is left of the jump between both ends falls on a straight line, which has no transform.
+    // The remaining step between both ends is removed as a straight line, which is not transformed.
     let (from, to) = (padded[0], padded[padded.len() - 1]);
     let line = |i: usize, length: usize| from + (to - from) * i as f64 / (length - 1) as f64;
     let length = padded.len();

@@ -1,16 +1,16 @@
 //! Fourier transforms of real records.
 //!
-//! `X[k] = Σ x[n] e^{−2πi kn/N}` for `k = 0..=N/2` and back, without scaling: there and back again multiplies by `N`.
+//! `X[k] = Σ x[n] e^{−2πi kn/N}` for `k = 0..=N/2` and its inverse, unscaled: a round trip multiplies by `N`.
 //!
-//! The planner of `rustfft` is generic, so every crate that names it compiles all of its kernels again: 0.4 million lines of
-//! LLVM code. Here it is named once.
+//! The planner of `rustfft` is generic, so every crate that uses it recompiles all of its kernels: 0.4 million lines of
+//! LLVM code. This crate is the only one to use it.
 
 use std::sync::Arc;
 
 use realfft::RealFftPlanner;
 pub use realfft::{ComplexToReal, RealToComplex};
 
-/// The transform of records of one length, from samples to `length / 2 + 1` bins.
+/// The forward transform for records of one length, from samples to `length / 2 + 1` bins.
 ///
 /// ```
 /// // A cosine of one period in 8 samples: 8/2 in bin 1, nothing elsewhere.
@@ -27,7 +27,7 @@ pub fn forward(length: usize) -> Arc<dyn RealToComplex<f64>> {
     RealFftPlanner::new().plan_fft_forward(length)
 }
 
-/// The way back, from `length / 2 + 1` bins to samples multiplied by `length`.
+/// The inverse transform, from `length / 2 + 1` bins to samples multiplied by `length`.
 #[inline(never)]
 #[must_use]
 pub fn inverse(length: usize) -> Arc<dyn ComplexToReal<f64>> {

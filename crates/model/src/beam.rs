@@ -54,17 +54,17 @@ pub struct Beam {
     clamp_stiffness_n_m_per_rad: Option<f64>,
 }
 
-/// Where the tip deflection of a beam comes from, each in m/N. The parts add up to the whole.
+/// Contributions to the tip deflection of a beam, each in m/N; their sum is the tip compliance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Compliance {
     /// Bending, as if the whole beam had its stiffest section: L³/(3 E I), (11).
     pub bending_m_per_n: f64,
-    /// Shear, as if the whole beam had its stiffest section: L/(κ G A). 0 when no shear modulus
-    /// is given, which is the slender-beam theory of the source.
+    /// Shear, as if the whole beam had its stiffest section: L/(κ G A). 0 without a shear modulus,
+    /// as in the slender-beam theory of the source.
     pub shear_m_per_n: f64,
-    /// Rotation of the clamp: L²/k. 0 when no clamp stiffness is given, which means rigid.
+    /// Rotation of the clamp: L²/k. 0 without a clamp stiffness, which means rigid.
     pub clamp_m_per_n: f64,
-    /// What segments of other sections add to bending and shear over the stiffest section.
+    /// Additional bending and shear of the segments weaker than the stiffest section.
     pub reduced_sections_m_per_n: f64,
 }
 
@@ -120,7 +120,7 @@ impl Beam {
         })
     }
 
-    /// The same beam with shear deflection (Timoshenko), `shear_modulus_pa` being G in Pa.
+    /// The same beam with shear deflection (Timoshenko); `shear_modulus_pa` is G in Pa.
     ///
     /// # Errors
     /// [`ModelError`] if G is not finite or not greater than 0.
@@ -141,7 +141,7 @@ impl Beam {
         })
     }
 
-    /// The same beam in a clamp that yields: moment per rotation k in N m/rad.
+    /// The same beam in a compliant clamp of moment per rotation k in N m/rad.
     ///
     /// # Errors
     /// [`ModelError`] if the stiffness is not finite or not greater than 0.
@@ -172,7 +172,7 @@ impl Beam {
         &self.segments
     }
 
-    /// Parts of the tip compliance y/P in m/N:
+    /// Contributions to the tip compliance y/P in m/N:
     ///
     /// y/P = ∫ (L−x)²/(E I(x)) dx + ∫ dx/(κ G A(x)) + L²/k
     ///
@@ -217,7 +217,8 @@ impl Beam {
         }
     }
 
-    /// Force per deflection at the loaded end, P/y in N/m: one over the sum of the compliances.
+    /// Tip stiffness, force per deflection at the loaded end, P/y in N/m: the reciprocal of the
+    /// total compliance.
     ///
     /// For one uniform slender segment this is 3 E I/L³, (11).
     ///
@@ -256,11 +257,11 @@ impl Beam {
 
     /// Strain at the surface, ε = P (L − x) c/(E I), (24)–(26).
     ///
-    /// `force_n` is P in N and may have either sign, `position_m` is x in m from the clamp, c the
-    /// half depth in m and I the second moment in m⁴ of the section at x; the result is m/m.
-    /// Where two segments meet, the one nearer the load counts. A gage of some length on one
-    /// segment reads the strain at its middle, as the strain is linear in x. Not valid within
-    /// about one depth of the clamp or a step, where plane sections no longer hold.
+    /// `force_n` is P in N, of either sign, `position_m` is x in m from the clamp, c the half depth
+    /// in m and I the second moment in m⁴ of the section at x; the result is in m/m. Where two
+    /// segments meet, the one nearer the load counts. A gage of finite length on one segment reads
+    /// the strain at its middle, as the strain is linear in x. Not valid within about one depth of
+    /// the clamp or a step, where plane sections do not remain plane.
     ///
     /// # Errors
     /// [`ModelError`] if x is not on the beam or a number is not finite.

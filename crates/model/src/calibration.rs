@@ -3,7 +3,7 @@
 use crate::check::{finite, non_zero, positive};
 use crate::error::ModelError;
 
-/// Voltage behind a deflection of the recorder, E = s n in V, (C22).
+/// Voltage for a deflection of the recorder, E = s n in V, (C22).
 ///
 /// `sensitivity_v_per_division` is s in V/division and greater than 0, `divisions` is n, signed.
 ///
@@ -25,9 +25,9 @@ pub fn deflection_voltage_v(
 
 /// Torque per volt of the whole chain, C_T = r F/E in N m/V, (C23).
 ///
-/// `radius_m` is r in m, `force_n` the test load F in N, `voltage_v` its change of output E in V.
-/// A negative result says that the output falls when the torque rises. Valid for a load at rest,
-/// in the linear range of gage and beam, without friction in the loading.
+/// `radius_m` is r in m, `force_n` the test load F in N, `voltage_v` its change of output E in V. A
+/// negative result means that the output falls as the torque rises. Valid for a static load, in the
+/// linear range of gage and beam, without friction in the loading.
 ///
 /// # Errors
 /// [`ModelError`] if r is not greater than 0, or F or E is 0 or not finite.

@@ -2,7 +2,7 @@
 
 use crate::error::ModelError;
 
-/// Passes a finite number.
+/// Accepts a finite number.
 pub(crate) fn finite(
     name: &'static str,
     unit: &'static str,
@@ -15,7 +15,7 @@ pub(crate) fn finite(
     }
 }
 
-/// Passes a finite number greater than zero.
+/// Accepts a finite number greater than zero.
 pub(crate) fn positive(
     name: &'static str,
     unit: &'static str,
@@ -29,7 +29,7 @@ pub(crate) fn positive(
     }
 }
 
-/// Passes a finite number that is zero or greater.
+/// Accepts a finite number that is zero or greater.
 pub(crate) fn non_negative(
     name: &'static str,
     unit: &'static str,
@@ -43,7 +43,7 @@ pub(crate) fn non_negative(
     }
 }
 
-/// Passes a finite number that is not zero.
+/// Accepts a finite number that is not zero.
 pub(crate) fn non_zero(
     name: &'static str,
     unit: &'static str,

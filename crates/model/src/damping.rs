@@ -9,9 +9,9 @@ use crate::response::SecondOrder;
 /// Viscous friction coefficient f = (ΔF/Δω) r in N m s/rad, (18).
 ///
 /// `slope_n_s_per_rad` is the slope ΔF/Δω of friction force against angular speed in N s/rad,
-/// `radius_m` the radius r in m at which the force was read. Covers only the friction between
-/// rotor and stator: the measured stand damps several orders of magnitude more, because the beam
-/// itself absorbs energy.
+/// `radius_m` the radius r in m at which the force was read. Covers only the friction between rotor
+/// and stator: the measured damping of the stand is several orders of magnitude higher, because the
+/// beam itself absorbs energy.
 ///
 /// # Errors
 /// [`ModelError`] if the slope is not finite or negative, or the radius is not greater than 0.
@@ -31,9 +31,9 @@ pub fn viscous_from_friction_slope_n_m_s_per_rad(
 
 /// Decay rate σ = ln(a₁/a₂)/Δt in 1/s, (C8).
 ///
-/// `first` and `second` are the amplitudes a₁ and a₂ in any one unit, with the offset removed;
-/// `elapsed_s` is Δt in s between them. Valid for viscous damping, which alone makes the
-/// amplitude fall exponentially.
+/// `first` and `second` are the amplitudes a₁ and a₂ in the same unit, with the offset removed;
+/// `elapsed_s` is Δt in s between them. Valid for viscous damping; only then is the decay
+/// exponential.
 ///
 /// # Errors
 /// [`ModelError`] if the amplitudes do not share a sign or do not fall, or Δt is not greater
@@ -73,9 +73,9 @@ pub fn angular_frequency_rad_per_s(period_s: f64) -> Result<f64, ModelError> {
     Ok(TAU / positive("period", "s", period_s)?)
 }
 
-/// What a free decay a e^{−σt} cos(ω_d t + φ) tells about the stand (Appendix C, II and III).
+/// Stand constants from a free decay a e^{−σt} cos(ω_d t + φ) (Appendix C, II and III).
 ///
-/// Valid for one lightly or strongly under-damped mode with viscous damping.
+/// Valid for one under-damped mode with viscous damping.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FreeDecay {
     decay_rate_per_s: f64,
@@ -175,8 +175,8 @@ impl FreeDecay {
     /// Torsional-spring constant K = J (ω_d² + σ²) in N m/rad, (C20).
     ///
     /// `inertia_kg_m2` is J in kg m². (C20) is printed as K = (4J²ω_d² + f²)/(4J); with f = 2σJ
-    /// from (C18) both are the same: (4J²ω_d² + 4σ²J²)/(4J) = J(ω_d² + σ²). (C19), from which it
-    /// is drawn, is right with the root over the numerator only: ω_d = √(4JK − f²)/(2J).
+    /// from (C18) both are the same: (4J²ω_d² + 4σ²J²)/(4J) = J(ω_d² + σ²). (C19), from which it is
+    /// derived, is right with the root over the numerator only: ω_d = √(4JK − f²)/(2J).
     ///
     /// # Errors
     /// [`ModelError`] if J is not finite or not greater than 0.

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// What can be wrong with numbers handed to the mechanics.
+/// An error in the numbers given to the mechanics.
 ///
 /// Every message names the number, its unit, what was expected and what to do.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -15,7 +15,7 @@ pub enum ModelError {
         name: &'static str,
         /// Unit it is given in.
         unit: &'static str,
-        /// Value got.
+        /// The value.
         value: f64,
     },
     /// A number that must be greater than zero is not.
@@ -25,7 +25,7 @@ pub enum ModelError {
         name: &'static str,
         /// Unit it is given in.
         unit: &'static str,
-        /// Value got.
+        /// The value.
         value: f64,
     },
     /// A number that must not be negative is.
@@ -35,7 +35,7 @@ pub enum ModelError {
         name: &'static str,
         /// Unit it is given in.
         unit: &'static str,
-        /// Value got.
+        /// The value.
         value: f64,
     },
     /// A number that is divided by is zero.
@@ -61,32 +61,32 @@ pub enum ModelError {
     /// A list that needs at least one entry is empty.
     #[error("the {what} has no {entries}; give at least one")]
     Empty {
-        /// What is empty.
+        /// Name of the list.
         what: &'static str,
-        /// What it should hold.
+        /// Required contents.
         entries: &'static str,
     },
-    /// A position lies off the beam.
+    /// A position outside the beam.
     #[error(
         "position {position_m} m is not on the beam, which reaches from 0 m at the clamp to \
          {length_m} m at the load; measure the position from the clamp"
     )]
     OffBeam {
-        /// Position got, in m from the clamp.
+        /// The position in m from the clamp.
         position_m: f64,
         /// Length of the beam in m.
         length_m: f64,
     },
-    /// There is no bending moment at the position of the gage.
+    /// No bending moment at the position of the gage.
     #[error(
         "a gage at {position_m} m sits at the loaded end of the beam, where the bending moment \
          is 0, so no strain tells the torque; move it towards the clamp"
     )]
     NoMoment {
-        /// Position got, in m from the clamp.
+        /// The position in m from the clamp.
         position_m: f64,
     },
-    /// A free decay needs a falling amplitude.
+    /// The amplitude of a free decay does not fall.
     #[error(
         "the amplitude goes from {first} to {second}, but a decay needs two amplitudes of one \
          sign, the later one smaller; pick two peaks of the same polarity"
@@ -103,7 +103,7 @@ pub enum ModelError {
          {frequency_hz} Hz; give a damping greater than 0"
     )]
     UndampedResonance {
-        /// Frequency asked for, in Hz.
+        /// The frequency in Hz.
         frequency_hz: f64,
     },
 }

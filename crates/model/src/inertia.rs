@@ -27,7 +27,7 @@ pub fn thin_ring_kg_m2(mass_kg: f64, radius_m: f64) -> Result<f64, ModelError> {
 
 /// Solid disc or cylinder about its axis: J = ½ m r², in kg m².
 ///
-/// `mass_kg` is m in kg, `radius_m` the outer radius r in m. Valid for an even mass per area.
+/// `mass_kg` is m in kg, `radius_m` the outer radius r in m. Valid for uniform mass per area.
 /// Source: second term of (19), there for one end bell.
 ///
 /// # Errors
@@ -45,9 +45,9 @@ pub fn disc_kg_m2(mass_kg: f64, radius_m: f64) -> Result<f64, ModelError> {
 
 /// Hollow cylinder about its axis: J = ½ m (r_o² + r_i²), in kg m².
 ///
-/// `mass_kg` is m in kg, `outer_radius_m` is r_o and `inner_radius_m` is r_i, both in m. Valid
-/// for an even density. Source: any textbook of dynamics, for example Meriam and Kraige,
-/// *Dynamics*, table D/4.
+/// `mass_kg` is m in kg, `outer_radius_m` is r_o and `inner_radius_m` is r_i, both in m. Valid for
+/// uniform density. Source: any textbook of dynamics, for example Meriam and Kraige, *Dynamics*,
+/// table D/4.
 ///
 /// # Errors
 /// [`ModelError`] if a number is not greater than 0 or the inner radius is not the smaller.
@@ -152,7 +152,7 @@ impl Part {
     /// Mass moment of inertia of this part in kg m².
     ///
     /// # Errors
-    /// [`ModelError`] if a dimension or the mass is impossible.
+    /// [`ModelError`] if a dimension or the mass is invalid.
     ///
     /// ```
     /// use torqcomp_model::Part;
@@ -176,7 +176,7 @@ impl Part {
 /// Inertia of the stator: the sum over its parts, (19), in kg m².
 ///
 /// # Errors
-/// [`ModelError`] if there is no part or a part is impossible.
+/// [`ModelError`] if there is no part or a part is invalid.
 ///
 /// ```
 /// use torqcomp_model::{Part, inertia::total_inertia_kg_m2};
@@ -202,9 +202,9 @@ pub fn total_inertia_kg_m2(parts: &[Part]) -> Result<f64, ModelError> {
 
 /// Inertia from a run-up, J = (T₂ − T₁)/θ'' in kg m², (C5).
 ///
-/// `friction_torque_n_m` is T₁ in N m, which just keeps the free stator turning; `torque_n_m` is
-/// T₂ in N m, which speeds it up by θ'' = `acceleration_rad_per_s2` in rad/s². Valid while f θ'
-/// is much less than T₂ − T₁.
+/// `friction_torque_n_m` is T₁ in N m, which just keeps the free stator turning; `torque_n_m` is T₂
+/// in N m, which accelerates it at θ'' = `acceleration_rad_per_s2` in rad/s². Valid while f θ' is
+/// much less than T₂ − T₁.
 ///
 /// # Errors
 /// [`ModelError`] if T₂ − T₁ or θ'' is not greater than 0, or T₁ is negative.
@@ -232,7 +232,7 @@ pub fn inertia_from_run_up_kg_m2(
 mod tests {
     use super::*;
 
-    /// ∫ r² dm of a body of even density between two radii, by the midpoint rule.
+    /// ∫ r² dm of a body of uniform density between two radii, by the midpoint rule.
     fn quadrature(mass: f64, inner: f64, outer: f64) -> f64 {
         let n = 100_000;
         let dr = (outer - inner) / f64::from(n);
@@ -253,7 +253,7 @@ mod tests {
                 hollow_cylinder_kg_m2(2.3, 0.07, 0.04).unwrap(),
                 quadrature(2.3, 0.04, 0.07),
             ),
-            // A wall of r/1000 makes the thin ring right to (1/2000)² = 2.5e-7.
+            // With a wall of r/1000 the thin-ring formula has an error of (1/2000)² = 2.5e-7.
             (
                 thin_ring_kg_m2(2.3, 0.07).unwrap(),
                 quadrature(2.3, 0.069965, 0.070035),

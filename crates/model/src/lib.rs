@@ -1,7 +1,7 @@
 //! Mechanics of a reaction-torque stand.
 //!
-//! The stator of a machine sits on a stiff beam, a strain gage on the beam reads the reaction
-//! torque, and the stator rings on the beam. This crate holds the mechanics of that stand:
+//! The stator of a machine sits on a stiff beam, a strain gage on the beam measures the reaction
+//! torque, and the stator rings on the beam. This crate contains the mechanics of that stand:
 //!
 //! ```text
 //! J θ'' + f θ' + K θ = T        stand, T the torque on the stator
@@ -13,20 +13,20 @@
 //! Text with units → [`Kind::parse`] → SI numbers, or an [`Estimate`] with its uncertainty →
 //! constants from the drawing ([`beam`], [`inertia`], [`damping`]) or from measurements
 //! ([`damping::FreeDecay`], [`calibration`]) → [`SecondOrder`] → [`SecondOrder::inverse`], the
-//! factor that turns the shown torque back into the torque that acted.
+//! factor that converts the measured torque to the applied torque.
 //!
-//! There is no file access here and no signal processing.
+//! The crate does no file access and no signal processing.
 //!
 //! # Conventions
 //!
 //! - SI inside: kg, m, s, A, K, rad. Names of bare numbers end in the unit, as in
-//!   `stiffness_n_m_per_rad`. Ratios carry no suffix.
+//!   `stiffness_n_m_per_rad`. Ratios have no suffix.
 //! - Time factor e^{+jωt}: the response of a stand lags, so the phase of [`SecondOrder::forward`]
 //!   runs from 0 to −π and the phase of [`SecondOrder::inverse`] from 0 to +π.
-//! - Positive angle, force at the beam and torque on the stator point the same way.
+//! - Positive angle, force at the beam and torque on the stator have the same direction.
 //! - Frequencies ending in `_hz` are cycles per second; ω = 2π·frequency is in rad/s.
-//! - Uncertainties are standard uncertainties (one standard deviation) unless a name says else.
-//!   An unknown uncertainty is `None`, never 0.
+//! - Uncertainties are standard uncertainties (one standard deviation) unless the name says
+//!   otherwise. An unknown uncertainty is `None`, never 0.
 //!
 //! # Sources
 //!
@@ -35,7 +35,7 @@
 //!
 //! # Modules
 //!
-//! | module | holds |
+//! | module | contents |
 //! |---|---|
 //! | [`quantity`] | units, physical kinds, numbers with uncertainty |
 //! | [`section`] | cross sections: area, second moment, shear coefficient |
@@ -43,9 +43,9 @@
 //! | [`inertia`] | mass moments of inertia of simple bodies |
 //! | [`damping`] | viscous coefficient, free decay |
 //! | [`response`] | transfer function and its inverse; [`ModalResponse`] is that of several modes |
-//! | [`effects`] | what a plain stand can lack |
-//! | [`chain`] | the links from the applied torque to the record, both ways |
-//! | [`simulate`] | the motion under an input, integrated in time |
+//! | [`effects`] | effects that a plain stand lacks |
+//! | [`chain`] | the links from the applied torque to the record, forward and inverse |
+//! | [`simulate`] | the motion for a given input, integrated in time |
 //! | [`uncertainty`] | uncertainty of the inverse |
 //! | [`calibration`] | torque per volt from a static load |
 //! | [`fit`] | least squares: parameters with uncertainties from data |

@@ -4,13 +4,13 @@
 //! H(s) = Σ (r_k + q_k s/ω_k) ω_k²/(s² + 2ζ_k ω_k s + ω_k²) + c,   Σ r_k + c = 1
 //! ```
 //!
-//! `H` is recorded over applied quantity, relative to that at rest. `r_k` is the part that mode `k` has in the response at
-//! rest; `c`, what they leave of 1, is the compliance of all modes above the band. `q_k` is zero where all parts of the
-//! stand pass through zero together, as with damping in proportion to stiffness and inertia (D. J. Ewins, *Modal Testing*,
-//! 2nd ed. (2000), 2.4 to 2.7, 4.4). A stand with `J θ'' + f θ' + K θ = T` has one mode with `r = 1`.
+//! `H` is recorded over applied quantity, normalised to its static value. `r_k` is the contribution of mode `k` to the
+//! static response; `c`, the remainder to 1, is the compliance of all modes above the band. `q_k` is zero where all
+//! parts of the stand pass through zero together, as with proportional damping (D. J. Ewins, *Modal Testing*, 2nd ed.
+//! (2000), 2.4 to 2.7, 4.4). A stand with `J θ'' + f θ' + K θ = T` has one mode with `r = 1`.
 //!
-//! With the shapes `φ` of the modes at the load and at the gage `r_k = φ_k(load) φ_k(gage)/ω_k²`, over the sum of them. A
-//! torque that acts beside the gage moves it by the parts `g_k = φ_k(gage)²/ω_k²`, over their sum.
+//! With the mode shapes `φ` at the load and at the gage, `r_k = φ_k(load) φ_k(gage)/ω_k²`, normalised by their sum. A
+//! torque that acts at the gage moves it by the contributions `g_k = φ_k(gage)²/ω_k²`, normalised by their sum.
 
 use num_complex::Complex64;
 
@@ -18,16 +18,17 @@ use crate::check::{non_negative, positive};
 use crate::error::ModelError;
 use crate::mode::Mode;
 
-/// What one mode has in the response of a stand.
+/// Contribution of one mode to the response of a stand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModalPart {
     /// The mode.
     pub mode: Mode,
-    /// `r`: its part of the response at rest.
+    /// `r`: its contribution to the static response.
     pub residue: f64,
-    /// `q`: the part of its residue that goes with the speed.
+    /// `q`: the velocity-proportional part of its residue.
     pub quadrature: f64,
-    /// `g`: its part in what a torque at the gage moves the gage by, at rest; `None` if that is not known.
+    /// `g`: its contribution to the static displacement of the gage by a torque at the gage; `None` if
+    /// unknown.
     pub at_gage: Option<f64>,
 }
 
@@ -43,7 +44,7 @@ impl ModalPart {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModalResponse {
     parts: Vec<ModalPart>,
-    /// `c`: what is left of the response at rest.
+    /// `c`: the remainder of the static response.
     residual: f64,
 }
 
@@ -63,10 +64,11 @@ impl From<Mode> for ModalResponse {
 }
 
 impl ModalResponse {
-    /// A sum of modes, in the order given; what their residues leave of 1 is the compliance of those above the band.
+    /// A sum of modes, in the order given; the remainder of their residues to 1 is the compliance of the modes above
+    /// the band.
     ///
     /// # Errors
-    /// [`ModelError`] if there is none, or one has a frequency, damping or residue that no mode has.
+    /// [`ModelError`] if there is none, or one has an invalid frequency, damping or residue.
     ///
     /// ```
     /// use torqcomp_model::{ModalPart, ModalResponse, Mode};
@@ -105,19 +107,19 @@ impl ModalResponse {
         &self.parts
     }
 
-    /// `c`: the part of the response at rest that comes from modes above the band.
+    /// `c`: the contribution of modes above the band to the static response.
     #[must_use]
     pub fn residual(&self) -> f64 {
         self.residual
     }
 
-    /// The first mode, which the others are measured by.
+    /// The first mode, the reference for the others.
     #[must_use]
     pub fn first(&self) -> Mode {
         self.parts[0].mode
     }
 
-    /// The mode of a stand that has no other part.
+    /// The mode of a single-mode stand.
     #[must_use]
     pub fn only(&self) -> Option<Mode> {
         match &self.parts[..] {
@@ -145,13 +147,13 @@ impl ModalResponse {
         }
     }
 
-    /// Its inverse: applied per recorded quantity, relative to that at rest.
+    /// The inverse response: applied per recorded quantity, normalised to its static value.
     #[must_use]
     pub fn inverse(&self, omega_rad_s: f64) -> Complex64 {
         self.inverse_with(omega_rad_s, |_, inverse| inverse)
     }
 
-    /// The inverse response with a change of each mode's own, as by a loss in the material: `change` takes a mode and its
+    /// The inverse response with a modification of each mode, as by material damping: `change` gets a mode and its
     /// `1 − (ω/ω_k)² + 2jζ ω/ω_k`.
     #[must_use]
     pub fn inverse_with(
@@ -173,8 +175,8 @@ impl ModalResponse {
         parts.sum::<Complex64>() + self.residual
     }
 
-    /// What a torque that acts beside the gage moves it by, at `s = jω`, relative to that at rest; `None` if the parts of
-    /// the modes in it are not known. A stand with one mode has its response there.
+    /// Response of the gage to a torque at the gage, at `s = jω`, normalised to its static value; `None` if the
+    /// contributions of the modes to it are unknown. For a stand with one mode it is the stand's response.
     #[must_use]
     pub fn at_gage(&self) -> Option<Self> {
         let part = |part: &ModalPart| {
@@ -211,8 +213,8 @@ mod tests {
         }
     }
 
-    /// Two inertias in a row: `J₁ = J₂ = 1`, `K₁ = K₂ = 1`, torque on the second, twist of the first spring recorded. Its
-    /// poles are at `ω² = (3 ∓ √5)/2`, and `θ₁/T = 1/((s² + 2)(s² + 1) − 1)` by Cramer's rule.
+    /// Two inertias in series: `J₁ = J₂ = 1`, `K₁ = K₂ = 1`, torque on the second, twist of the first spring recorded.
+    /// Its poles are at `ω² = (3 ∓ √5)/2`, and `θ₁/T = 1/((s² + 2)(s² + 1) − 1)` by Cramer's rule.
     #[test]
     fn two_inertias_are_a_sum_of_two_modes() {
         let squares = [0.5 * (3.0 - 5.0_f64.sqrt()), 0.5 * (3.0 + 5.0_f64.sqrt())];

@@ -14,7 +14,7 @@ pub struct Mode {
 }
 
 impl Mode {
-    /// From the decay rate `σ = ζω₀` in 1/s and the damped angular frequency `ω_d` in rad/s of its ringing:
+    /// From the decay rate `σ = ζω₀` in 1/s and the damped angular frequency `ω_d` in rad/s:
     /// `ω₀ = √(σ² + ω_d²)`, (C12) to (C20).
     ///
     /// ```
@@ -36,13 +36,13 @@ impl Mode {
         self.omega_rad_s / TAU
     }
 
-    /// Decay rate of its ringing in 1/s.
+    /// Decay rate in 1/s.
     #[must_use]
     pub fn decay_rate_per_s(&self) -> f64 {
         self.damping_ratio * self.omega_rad_s
     }
 
-    /// `1 − (ω/ω₀)² + 2jζ ω/ω₀`: applied per recorded quantity, relative to that at rest.
+    /// `1 − (ω/ω₀)² + 2jζ ω/ω₀`: applied per recorded quantity, normalised to its static value.
     ///
     /// ```
     /// let mode = torqcomp_model::Mode { omega_rad_s: 5.0, damping_ratio: 0.6 };

@@ -102,13 +102,13 @@ impl SecondOrder {
     /// # Ok::<(), torqcomp_model::ModelError>(())
     /// ```
     pub fn damping_ratio(&self) -> f64 {
-        // Two roots instead of one of the product, which could leave the range of a float.
+        // The product of the two could overflow or underflow; two square roots do not.
         let critical = self.stiffness_n_m_per_rad.sqrt() * self.inertia_kg_m2.sqrt();
         self.damping_n_m_s_per_rad / (2.0 * critical)
     }
 
-    /// Damped frequency f_d = √(1 − ζ²) f_n in Hz, (23); `None` from ζ = 1 on, where the stand
-    /// does not ring.
+    /// Damped frequency f_d = √(1 − ζ²) f_n in Hz, (23); `None` for ζ ≥ 1, where the stand does not
+    /// ring.
     ///
     /// ```
     /// // ζ = 0.6, ω_n = 5 rad/s: ω_d = 4 rad/s = 0.636620 Hz.
@@ -122,9 +122,9 @@ impl SecondOrder {
         (ratio < 1.0).then(|| ((1.0 - ratio) * (1.0 + ratio)).sqrt() * self.natural_frequency_hz())
     }
 
-    /// Decay rate σ = f/(2 J) in 1/s of the ringing, (C17) with the sign of a rate.
+    /// Decay rate σ = f/(2 J) in 1/s, (C17), positive for a decay.
     ///
-    /// From ζ = 1 on the stand does not ring and this is the mean of its two rates.
+    /// For ζ ≥ 1 the stand does not ring and this is the mean of its two rates.
     ///
     /// ```
     /// // f = 12, J = 2: 3 1/s.
@@ -155,7 +155,7 @@ impl SecondOrder {
     /// Inverse transfer function T/T_o = (K − J ω² + jω f)/K, (32), a ratio.
     ///
     /// `frequency_hz` is ω/2π in Hz; time factor e^{+jωt}. The magnitude grows as ω² above the
-    /// natural frequency, so noise there grows with it: limit the band.
+    /// natural frequency, and amplifies noise accordingly: limit the band.
     ///
     /// ```
     /// // J = 2, f = 12, K = 50 at ω = 5 rad/s: (50 − 50 + j60)/50 = j1.2.

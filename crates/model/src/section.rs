@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use crate::check::positive;
 use crate::error::ModelError;
 
-/// Poisson's ratio behind the default shear coefficient of a tube.
+/// Poisson's ratio for the default shear coefficient of a tube.
 const POISSON_RATIO_STEEL: f64 = 0.3;
 
 /// A cross section, symmetric about the neutral axis of bending.
@@ -136,7 +136,7 @@ impl CrossSection {
         self.half_depth_m
     }
 
-    /// Dimensions so small that a power underflows, or so large that it overflows, end here.
+    /// Rejects dimensions so small or large that a power of them underflows or overflows.
     fn checked(
         area_m2: f64,
         second_moment_m4: f64,
@@ -162,7 +162,7 @@ fn cowper_tube(m: f64, nu: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// ∫ y² b(y) dy by the midpoint rule, the slow oracle for second moments.
+    /// ∫ y² b(y) dy by the midpoint rule, a slow reference for second moments.
     fn integrate(half_depth: f64, width: impl Fn(f64) -> f64) -> (f64, f64) {
         let n = 400_000;
         let dy = 2.0 * half_depth / f64::from(n);

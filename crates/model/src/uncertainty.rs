@@ -18,8 +18,7 @@ use crate::check::non_negative;
 use crate::error::ModelError;
 use crate::response::SecondOrder;
 
-/// Standard uncertainties of the constants of a stand; `None` means none is known, and the
-/// constant then counts as exact.
+/// Standard uncertainties of the constants of a stand; a constant with `None` counts as exact.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ParameterStd {
     /// Of the inertia, in kg m².
@@ -35,7 +34,7 @@ pub struct ParameterStd {
 }
 
 impl ParameterStd {
-    /// Refuses negative and non-finite uncertainties.
+    /// Rejects negative and non-finite uncertainties.
     fn check(&self) -> Result<(), ModelError> {
         let named = [
             (
@@ -101,7 +100,8 @@ pub struct InverseGradient {
 }
 
 impl SecondOrder {
-    /// Gradient of the inverse transfer function, see [`InverseGradient`] and the module's text.
+    /// Gradient of the inverse transfer function, see [`InverseGradient`] and the module's
+    /// documentation.
     ///
     /// `frequency_hz` is ω/2π in Hz.
     ///
@@ -137,11 +137,10 @@ impl SecondOrder {
 
     /// Standard uncertainty of the inverse transfer function at `frequency_hz` (ω/2π in Hz).
     ///
-    /// u²(ln|G|) = Σ Σ ∂ln|G|/∂p ∂ln|G|/∂q u(p) u(q) r(p, q) over p, q = J, f, K with their
-    /// correlations r, plus the relative u² of the static gain; u²(φ) likewise without the gain (JCGM 100:2008,
-    /// clause 5.2.2, equation 16). `None` if no uncertainty is known at all. Valid
-    /// while the changes are small against |G|: close to the natural frequency of a lightly
-    /// damped stand u(K)/K and u(J)/J must be well below 2ζ.
+    /// u²(ln|G|) = Σ Σ ∂ln|G|/∂p ∂ln|G|/∂q u(p) u(q) r(p, q) over p, q = J, f, K with their correlations r,
+    /// plus the relative u² of the static gain; u²(φ) likewise without the gain (JCGM 100:2008, clause 5.2.2,
+    /// equation 16). `None` if no uncertainty is known at all. Valid while the changes are small compared with
+    /// |G|: close to the natural frequency of a lightly damped stand u(K)/K and u(J)/J must be well below 2ζ.
     ///
     /// # Errors
     /// [`ModelError`] if an uncertainty is negative or not finite, or the inverse is zero.
@@ -180,14 +179,14 @@ impl SecondOrder {
             std.damping_n_m_s_per_rad,
             std.stiffness_n_m_per_rad,
         ];
-        // The static gain scales the torque and does not turn its phase.
+        // The static gain scales the torque without changing its phase.
         let stds = parameters.map(|std| std.unwrap_or(0.0));
         let [jf, jk, fk] = std.correlations;
         let spread = |gradient: [f64; 3]| {
             let part = |i: usize| gradient[i] * stds[i];
             let own = (0..3).map(|i| part(i) * part(i)).sum::<f64>();
             let mixed = jf * part(0) * part(1) + jk * part(0) * part(2) + fk * part(1) * part(2);
-            // Rounded correlations may leave a little less than nothing.
+            // Rounded correlations may make it slightly negative.
             (own + 2.0 * mixed).max(0.0).sqrt()
         };
         let of_gain = std.static_gain_relative.unwrap_or(0.0);

@@ -1,4 +1,5 @@
-//! Where a surface that knows no law is asked: something is left, and no law may be the cause of it.
+//! When to fit a surface without a given law: a residual is left, and possibly none of the laws
+//! causes it.
 
 use torqcomp_dsp::rms;
 
@@ -11,22 +12,22 @@ use crate::diagnose::structure::EffectForm;
 use crate::diagnose::verdict::noise_rms;
 use crate::diagnose::{ForceSurface, SearchState};
 
-/// A surface that explains more than the laws beside which it was fitted.
+/// A surface that explains more than the laws in addition to which it was fitted.
 pub struct AskedSurface {
     surface: Surface,
     /// The model with these laws.
     model: ScoredModel,
     /// Whether they are withdrawn for it.
     pub outdoes_laws: bool,
-    /// Whether it shows that they are not all.
+    /// Whether it shows that they are incomplete.
     pub shows_lack: bool,
-    /// What it says of the held-out records, once it is judged, if they bear it out.
+    /// Its report on the held-out records, if these confirm it.
     report: Option<ForceSurface>,
 }
 
 impl SearchState {
-    /// Fits a surface where the model leaves something, keeps it if it explains more, and withdraws the laws of the model if it
-    /// explains far more than they do.
+    /// Fits a surface if the model leaves a residual, keeps it if it explains more, and withdraws the laws of the model
+    /// if it explains far more than they do.
     pub fn ask_surface(&mut self, threads: usize) {
         let model = self.after.clone();
         let is_open = !self.is_at_noise() || self.suspected.is_some();
@@ -51,7 +52,7 @@ impl SearchState {
         });
     }
 
-    /// Goes back to a model without the laws of the motion that were found.
+    /// Reverts to a model without the laws of the motion.
     fn withdraw_laws(&mut self, surface: &Surface) {
         let ratio = rms(&seen(&self.after.train)) / surface.unseen_rms();
         let fitted = &self.after.fitted;
@@ -75,7 +76,7 @@ impl SearchState {
         self.without.clear();
     }
 
-    /// Puts the surface to the held-out records, and takes the laws back that it outdid where these do not bear it out.
+    /// Tests the surface on the held-out records, and restores the withdrawn laws if these do not confirm it.
     pub fn judge_surface(&mut self) {
         let Some(mut asked) = self.surface.take() else {
             return;
@@ -91,7 +92,7 @@ impl SearchState {
         self.surface = Some(asked);
     }
 
-    /// The surface that the held-out records bear out; where no effect is named in the end, one in place of all.
+    /// The surface confirmed by the held-out records; if no effect is named in the end, one in place of all.
     pub fn force_surface(&self, threads: usize) -> Option<ForceSurface> {
         if let Some(asked) = &self.surface {
             return asked.report.clone();

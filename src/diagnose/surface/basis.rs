@@ -1,37 +1,37 @@
-//! The functions of displacement, speed and history that a surface is made of.
+//! Basis functions of a surface: of displacement, speed and history.
 
 use super::motion::MeasuredMotion;
 
-/// Knots over displacement and over speed.
+/// Number of knots over displacement and over speed.
 pub const KNOTS: [usize; 2] = [33, 17];
-/// Powers of displacement and speed in products.
+/// Powers of displacement and speed in product terms.
 const PRODUCTS: [[i32; 2]; 6] = [[1, 1], [1, 2], [2, 1], [1, 3], [2, 2], [3, 1]];
-/// Knots over displacement of what turns round with the direction of motion.
+/// Number of knots over displacement of terms that change sign with the direction of motion.
 const TURNING: usize = 11;
-/// Speed over the largest from which on the direction of motion counts in full.
+/// Speed, relative to the largest, above which the direction of motion counts in full.
 const TURNED: f64 = 1.0 / 64.0;
-/// Part of the samples, and fewest of them, that lie beyond the outer knots at each end.
+/// Fraction of the samples beyond the outer knots at each end, and their minimum number.
 const OUTSIDE: f64 = 1e-3;
 const FEWEST: usize = 16;
-/// Thresholds of slipping elements, over the largest displacement.
+/// Thresholds of slipping elements, relative to the largest displacement.
 const SLIPS: [f64; 3] = [0.05, 0.15, 0.4];
-/// Corner of a slow memory over the natural frequency.
+/// Corner of a slow memory, relative to the natural frequency.
 const SLOW: f64 = 0.1;
 
-/// Knots of displacement and speed, for all records alike.
+/// Knots of displacement and speed, common to all records.
 pub struct Grid {
     pub x: Knots,
     pub speed: Knots,
     largest: [f64; 2],
 }
 
-/// Places along an axis, and how much of the motion is near each.
+/// Knots along an axis, and the density of the motion near each.
 pub struct Knots {
     pub at: Vec<f64>,
     pub share: Vec<f64>,
 }
 
-/// Which part of a surface a function belongs to.
+/// The part of a surface to which a function belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SurfacePart {
     Displacement,
@@ -50,7 +50,7 @@ impl Grid {
         let [slow, fast] = reached(motions, |m| &m.speed);
         let place = |k: usize, count: usize| k as f64 / (count - 1) as f64;
         let fastest = fast.max(-slow);
-        // Friction changes where the speed is small.
+        // Friction varies at low speed.
         let curved = |u: f64| fastest * u * u.abs();
         let [many, few] = KNOTS;
         let x = (0..many).map(|k| low + (high - low) * place(k, many));
@@ -62,7 +62,7 @@ impl Grid {
         }
     }
 
-    /// Size of the functions, in units of displacement.
+    /// Scale of the functions, in units of displacement.
     pub fn size(&self) -> f64 {
         self.largest[0]
     }
@@ -96,7 +96,7 @@ impl Grid {
         all
     }
 
-    /// Functions of displacement that change sign with the direction of motion: friction that depends on the place.
+    /// Functions of displacement that change sign with the direction of motion: position-dependent friction.
     fn turning(&self, motion: &MeasuredMotion) -> Vec<Vec<f64>> {
         let [largest, fastest] = self.largest;
         let (first, last) = (self.x.at[0], self.x.at[self.x.at.len() - 1]);
@@ -112,8 +112,8 @@ impl Grid {
     }
 }
 
-/// The range of a motion but for its outermost values: what few samples tell of a place beyond must not be carried on to where
-/// another record goes.
+/// The range of a motion without its outermost values: what few samples determine beyond must not be extrapolated to
+/// where another record goes.
 fn reached(motions: &[MeasuredMotion], of: fn(&MeasuredMotion) -> &[f64]) -> [f64; 2] {
     let mut all: Vec<f64> = motions.iter().flat_map(of).copied().collect();
     let outside = (OUTSIDE * all.len() as f64).ceil() as usize;
@@ -139,7 +139,8 @@ impl Knots {
     }
 }
 
-/// Piecewise linear functions that are `size` at one knot and zero at all others; beyond the outer knots they go on straight.
+/// Piecewise linear functions that are `size` at one knot and zero at all others; linearly extrapolated beyond the
+/// outer knots.
 fn hats(knots: &[f64], at: &[f64], size: f64) -> Vec<Vec<f64>> {
     let mut all = vec![vec![0.0; at.len()]; knots.len()];
     for (i, x) in at.iter().enumerate() {
@@ -163,7 +164,7 @@ fn slipping(x: &[f64], threshold: f64) -> Vec<f64> {
     x.iter().map(next).collect()
 }
 
-/// A displacement that follows slowly: `z' = ω (x − z)`, `step = ω/f_s`.
+/// A displacement through a slow lag: `z' = ω (x − z)`, `step = ω/f_s`.
 fn relaxing(x: &[f64], step: f64) -> Vec<f64> {
     let share = 1.0 - (-step).exp();
     let mut z = 0.0;

@@ -1,6 +1,6 @@
-//! The straight line in a curve: a matter of the stand's constants.
+//! Removal of the straight line in a curve, which belongs to the stand's constants.
 
-/// Takes the straight line that fits best, by weights, out of values at some places.
+/// Subtracts the weighted least-squares line from values at some positions.
 pub fn clear_line(values: &mut [f64], at: &[f64], weight: impl Fn(usize) -> f64) {
     let sum = |of: &dyn Fn(usize) -> f64| -> f64 {
         let all = 0..at.len();
@@ -21,7 +21,8 @@ mod tests {
 
     #[test]
     fn what_is_left_is_bent() {
-        // With equal weights x² over −1, 0, 1 leaves 1/3, −2/3, 1/3; a weight of none does not count.
+        // With equal weights, x² over −1, 0, 1 leaves 1/3, −2/3, 1/3; a value of zero weight is
+        // ignored.
         let mut values = [1.0 + 2.0 - 5.0, 2.0, 1.0 + 2.0 + 5.0, 1e6];
         let weights = [1.0, 1.0, 1.0, 0.0];
         clear_line(&mut values, &[-1.0, 0.0, 1.0, 3.0], |k| weights[k]);

@@ -1,10 +1,10 @@
-//! A flexible rival that knows no law: the torque that the stand lacks as a surface over displacement and speed, with a
-//! memory (restoring-force surface; S. F. Masri, T. K. Caughey, J. Appl. Mech. 46 (1979), 433).
+//! A flexible alternative without a given law: the missing torque of the stand as a surface over displacement and
+//! speed, with memory (restoring-force surface; S. F. Masri, T. K. Caughey, J. Appl. Mech. 46 (1979), 433).
 //!
-//! With the linear stand `H` the record is `y = H G u − H n(x, x', z)`, and `n` a sum of functions ([`basis`]) of the motion
-//! that was measured, so that all coefficients follow from linear least squares ([`regression`]). Corrections of the constants
-//! of the stand are the columns `H x` and `H x'` among them. Where `n` bends the part that the gage sits on, its column is
-//! `n − H n`; where the gage itself is curved, `n`.
+//! With the linear stand `H` the record is `y = H G u − H n(x, x', z)`, with `n` a sum of functions ([`basis`]) of the
+//! measured motion, so that all coefficients follow from linear least squares ([`regression`]). Corrections of the
+//! stand's constants are the columns `H x` and `H x'` among them. If `n` acts on the part that carries the gage, its
+//! column is `n − H n`; if the gage itself is nonlinear, `n`.
 
 mod ask;
 mod basis;
@@ -58,18 +58,18 @@ const PLACES: [SurfacePlace; 3] = [
     SurfacePlace::Gage,
 ];
 
-/// Columns that stand for the plain stand: input, displacement, speed.
+/// Number of columns of the plain stand: input, displacement, speed.
 const PLAIN: usize = 3;
-/// Minimum significance with which a surface leaves less than the best laws.
+/// Minimum significance of a surface's improvement over the best laws.
 const LEAST_SIGNIFICANCE: f64 = 3.0;
-/// Largest part of a model's error power that a surface leaves where it shows that the model lacks something: what a step of
-/// integration or an interpolated input takes from a right law is less.
+/// Largest fraction of a model's error power that a surface leaves if it shows that the model is incomplete:
+/// integration steps or an interpolated input cost a correct law less.
 const SHOWN: f64 = 0.95;
-/// Shifts of the residuals against the motion, and how far what a surface leaves must be below what it leaves of them, over
-/// the scatter of that.
+/// Number of shifts of the residuals against the motion, and distance of the surface's residual below those of the
+/// shifted ones, in units of their scatter.
 const SHIFTS: usize = 19;
 const LEAST_OVER_SHIFTED: f64 = 4.0;
-/// Largest part of the laws' excess error power that a surface that outdoes them leaves.
+/// Largest fraction of the laws' excess error power left by a surface that supersedes them.
 const LEFT: f64 = 0.5;
 
 /// A surface, fitted to the training records.
@@ -77,23 +77,25 @@ pub struct Surface {
     pub place: SurfacePlace,
     grid: Grid,
     solution: Solution,
-    /// What it leaves of each training sample, by coefficients that were found without it.
+    /// Cross-validated residual of each training sample.
     unseen: Vec<f64>,
-    /// The same of the columns of the plain stand alone: along a measured motion, these take with them some of what disturbs it.
+    /// The same with the columns of the plain stand alone: along a measured motion, these absorb some of its
+    /// disturbances.
     unseen_by_plain: Vec<f64>,
-    /// What is missed without each part, over the sum of all four.
+    /// Increase of the residual without each part, relative to the sum of all four.
     shares: [f64; SurfacePart::ALL.len()],
 }
 
-/// Where the motion is taken from.
+/// Source of the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum MotionSource {
-    /// The record, along what passes the stand. What does not has the noise of the record itself in it: there it is the model.
+    /// The record, for terms that pass through the stand. Terms that do not would include the noise of the record
+    /// itself; for them it is the model.
     Record,
     Model,
 }
 
-/// A model without the laws that a surface stands in for.
+/// A model without the laws that a surface replaces.
 struct Background<'a> {
     model: &'a ScoredModel,
     linear: Chain,
@@ -103,7 +105,8 @@ struct Background<'a> {
 }
 
 impl Surface {
-    /// The surface that explains the training records best in place of the laws of a model; `None` if none can be fitted.
+    /// The surface that best explains the training records in place of the laws of a model; `None` if none can be
+    /// fitted.
     pub fn fit(model: &ScoredModel, threads: usize) -> Option<Self> {
         let fits = parallel(PLACES.len(), threads, |k| Self::at(PLACES[k], model));
         let sum = |surface: &Self| dot(&surface.unseen, &surface.unseen);
@@ -132,23 +135,23 @@ impl Surface {
         })
     }
 
-    /// Rms of what it leaves of training samples that it was not fitted to.
+    /// Cross-validated RMS residual of the training samples.
     pub fn unseen_rms(&self) -> f64 {
         rms(&self.unseen)
     }
 
-    /// Whether it leaves significantly less of the training records than a model does, in samples that it was not fitted to.
+    /// Whether its cross-validated residual on the training records is significantly smaller than that of a model.
     pub fn improves_on(&self, model: &ScoredModel) -> bool {
         [&seen(&model.train), &self.unseen_by_plain]
             .iter()
             .all(|before| compare(before, &self.unseen).significance() >= LEAST_SIGNIFICANCE)
     }
 
-    /// Whether a surface at its place shows that a model lacks something in the training records, in samples that it was not
-    /// fitted to.
+    /// Whether the cross-validated residual of a surface shows that a model is incomplete on the training records.
     ///
-    /// It goes along the motion of the model, with which noise that the stand answers does not come in. It must leave far
-    /// less than of the same residuals shifted against the motion: what rings for long is predicted from what is beside it.
+    /// It uses the motion of the model, which excludes the stand's response to noise. Its residual must be far smaller
+    /// than with the same residuals shifted against the motion, as a lightly damped oscillation can be predicted from
+    /// its neighbourhood.
     pub fn shows_lack(&self, model: &ScoredModel, threads: usize) -> bool {
         let along_model = regression(MotionSource::Model, self.place, model);
         let Some((_, regression)) = along_model else {
@@ -174,7 +177,8 @@ impl Surface {
         }
     }
 
-    /// Whether it explains so much more than a model that no law of that is to be named: not where a law leaves little but noise.
+    /// Whether it explains so much more than a model that none of the model's laws is to be named: not where a law
+    /// leaves little but noise.
     pub fn outdoes(&self, model: &ScoredModel, noise_rms: f64) -> bool {
         let excess = |rms: f64| rms.powi(2) - noise_rms.powi(2);
         let left = excess(rms(&seen(&model.train)));
@@ -183,7 +187,7 @@ impl Surface {
         is_much && self.improves_on(model) && excess(self.unseen_rms()) <= LEFT * least
     }
 
-    /// What it leaves of the records on which a model is compared, by the motion that was measured there.
+    /// Its residual on the records used for comparison, along the motion measured there.
     pub fn left_of_compared(&self, model: &ScoredModel) -> Option<Vec<f64>> {
         let background = Background::of(model, self.place, MotionSource::Record);
         let left = model.compared.iter().map(|residual| {
@@ -197,7 +201,7 @@ impl Surface {
     }
 }
 
-/// The columns of a surface, and the training records that these are to explain.
+/// The columns of a surface, and the training records as their target.
 fn regression(
     source: MotionSource,
     place: SurfacePlace,
@@ -215,7 +219,7 @@ fn regression(
     Some((grid, regression))
 }
 
-/// Training records with the residuals of a model shifted in a circle by a part of their length.
+/// Training records with the residuals of a model shifted circularly by a fraction of their length.
 fn shifted(regression: &Regression, model: &ScoredModel, part: f64) -> Vec<Vec<f64>> {
     let both = regression.targets().iter().zip(model.train.iter());
     let with_shifted = |(target, residual): (&Vec<f64>, &RecordResidual)| {
@@ -227,23 +231,23 @@ fn shifted(regression: &Regression, model: &ScoredModel, part: f64) -> Vec<Vec<f
     both.map(with_shifted).collect()
 }
 
-/// Whether a surface leaves so much less than a model that the model lacks something.
+/// Whether the residual of a surface is so much smaller that the model is incomplete.
 fn shows(before: &[f64], left: &[f64]) -> bool {
     let compared = compare(before, left);
     let [power, left] = compared.sums();
     left <= SHOWN * power && compared.significance() >= LEAST_SIGNIFICANCE
 }
 
-/// Samples of a record that a surface is fitted to: more would take memory, and say little more.
+/// Maximum number of samples of a record used for a surface: more would take memory and add little.
 const MOST_SAMPLES: usize = 1 << 17;
 
-/// What a surface sees of the residuals of a model.
+/// The part of the residuals of a model used for a surface.
 pub fn seen(residuals: &[RecordResidual]) -> Vec<f64> {
     let first = |r: &RecordResidual| r.samples[..r.samples.len().min(MOST_SAMPLES)].to_vec();
     residuals.iter().flat_map(first).collect()
 }
 
-/// The beginning of a record that a surface sees.
+/// The beginning of a record, as used for a surface.
 fn cut(record: &StandRecord) -> StandRecord {
     let end = record.range.end.min(record.range.start + MOST_SAMPLES);
     if end == record.range.end {
@@ -260,7 +264,7 @@ fn cut(record: &StandRecord) -> StandRecord {
     }
 }
 
-/// Whether an effect is a law of the motion: a surface stands in for it.
+/// Whether an effect is a law of the motion, which a surface replaces.
 pub fn is_law(stage: Stage) -> bool {
     matches!(stage, Stage::Stand | Stage::Gage | Stage::Limit)
 }
@@ -283,7 +287,7 @@ impl<'a> Background<'a> {
         MeasuredMotion::along(self.model, record, is_corrected)
     }
 
-    /// The columns of a record, and the record, both without what belongs to it.
+    /// The columns of a record, and the record, both without its nuisance terms.
     fn columns(
         &self,
         record: &StandRecord,
@@ -318,7 +322,7 @@ impl<'a> Background<'a> {
     }
 }
 
-/// A model with the effects of some stages alone, the recorder where the chain is among them.
+/// A model with the effects of some stages only, with the recorder if the chain is among them.
 fn reduced(model: &ScoredModel, keeps: impl Fn(Stage) -> bool) -> (Chain, NuisanceTerms) {
     let structure = &model.fitted.structure;
     let is_kept = |k: usize| keeps(structure.effects[k].form.stage);

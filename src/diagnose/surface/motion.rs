@@ -1,4 +1,4 @@
-//! The motion along a record: what the model says, corrected by the slow part of what it leaves.
+//! Motion along a record: that of the model, corrected by the low-frequency part of its residual.
 
 use num_complex::Complex64;
 
@@ -7,20 +7,20 @@ use crate::diagnose::score::ScoredModel;
 use torqcomp_model::Chain;
 use torqcomp_model::effects::Stage;
 
-/// Frequency over the natural one up to which the residual is taken for motion: above it there is little but noise, which a
-/// speed would have too much of.
+/// Frequency, relative to the natural one, up to which the residual is attributed to motion: above it there is little
+/// but noise, which differentiation to a speed would amplify.
 const CORRECTED: f64 = 5.0;
 
 /// Displacement and speed at each sample of a record.
 pub struct MeasuredMotion {
     pub x: Vec<f64>,
-    /// Over the natural angular frequency, so that it has the size of the displacement.
+    /// Over the natural angular frequency, so that it is comparable with the displacement.
     pub speed: Vec<f64>,
 }
 
 impl MeasuredMotion {
-    /// The motion along a record with the initial state that the model has there, corrected by what it leaves of the record, or
-    /// not; `None` if it diverges.
+    /// The motion along a record with the model's initial state, optionally corrected by its residual; `None` if it
+    /// diverges.
     pub fn along(model: &ScoredModel, record: &StandRecord, is_corrected: bool) -> Option<Self> {
         let fitted = &model.fitted;
         let mut x = up_to_the_gage(model, record)?;
@@ -36,14 +36,14 @@ impl MeasuredMotion {
     }
 }
 
-/// What the gage shows in the model, before the recorder.
+/// Gage signal of the model, before the recorder.
 fn up_to_the_gage(model: &ScoredModel, record: &StandRecord) -> Option<Vec<f64>> {
     let (chain, _) = super::reduced(model, |stage| stage <= Stage::Gage);
     let shown = record.run_of(&chain).simulate(&record.input);
     shown.last().is_some_and(|x| x.is_finite()).then_some(shown)
 }
 
-/// What a model leaves of a record, without what belongs to the record but the motion, and without the noise at high frequencies.
+/// Residual of a model on a record, without nuisance terms other than the motion, and without the high-frequency noise.
 fn slow_part(
     record: &StandRecord,
     recorded: &[f64],
@@ -55,7 +55,7 @@ fn slow_part(
     if left.last().is_none_or(|r| !r.is_finite()) {
         return None;
     }
-    // Outside the range the terms of the record are not known.
+    // The nuisance terms are unknown outside the range.
     let inside = &mut left[record.range.clone()];
     record.nuisance_beside_motion(terms).clear(inside);
     left[..record.range.start].fill(0.0);
@@ -66,7 +66,7 @@ fn slow_part(
     }))
 }
 
-/// Samples along a record through a response over the angular frequency.
+/// Samples along a record, filtered by a response over angular frequency.
 pub fn through(
     record: &StandRecord,
     samples: &[f64],
@@ -79,7 +79,7 @@ pub fn through(
     record.input.samples_of(spectrum)
 }
 
-/// What a torque of unit gain at the gage adds to the record, by angular frequency.
+/// Contribution to the record of a unit torque at the gage, by angular frequency.
 pub fn of_torque(chain: &Chain) -> impl Fn(f64) -> Complex64 + '_ {
     let at_gage = chain.stand.at_gage();
     move |omega| {

@@ -1,4 +1,4 @@
-//! Least squares with many columns, and what it leaves of samples that it has not seen.
+//! Least squares with many columns, with cross-validation.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -6,28 +6,28 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use torqcomp_dsp::dot;
 
-/// Parts into which the samples are dealt out; each is predicted from the others.
+/// Number of cross-validation folds; each is predicted from the others.
 const FOLDS: usize = 8;
-/// Stretches of each record that are dealt out in turn.
+/// Number of segments of each record, assigned to the folds in turn.
 const STRETCHES: usize = 24;
-/// Standard deviations of a function's part of the record, over the rms of the record, that are tried as expectation before
-/// the data: a small one keeps small what few samples determine.
+/// Prior standard deviations tried for a function's contribution to the record, relative to the RMS of the record: a
+/// small one shrinks coefficients that few samples determine.
 const EXPECTED: [f64; 10] = [1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-5, 1e-8];
-/// The same where the functions are to give nothing.
+/// The same for functions that are to contribute nothing.
 const NOTHING: f64 = 1e-100;
-/// Torque over the largest of the spring that is expected of a function at most, however few samples there are to tell.
+/// Maximum prior torque of a function, relative to the largest of the spring, however few samples determine it.
 const LARGEST: f64 = 10.0;
-/// What a coefficient of the plain stand costs, in noise powers: next to nothing.
+/// Penalty of a coefficient of the plain stand, in noise powers: negligible.
 const FREE: f64 = 1e-6;
 
-/// Columns and what they are to explain, record by record.
+/// Columns and their target, record by record.
 pub struct Regression {
     columns: Arc<Vec<Vec<Vec<f64>>>>,
     targets: Vec<Vec<f64>>,
-    /// Gram matrix of each fold, and the products of its columns with what is to be explained.
+    /// Gram matrix of each fold, and the products of its columns with the target.
     grams: Arc<Vec<DMatrix<f64>>>,
     products: Vec<DVector<f64>>,
-    /// The first columns, which are free.
+    /// Number of leading columns without a penalty.
     free: usize,
     noise_power: f64,
 }
@@ -35,9 +35,9 @@ pub struct Regression {
 /// Coefficients of all columns.
 pub struct Solution {
     coefficients: DVector<f64>,
-    /// Those found without one of the folds.
+    /// Coefficients found without each of the folds.
     without: Vec<DVector<f64>>,
-    /// What the square of each coefficient costs.
+    /// Penalty of each squared coefficient.
     ridge: DVector<f64>,
 }
 
@@ -69,7 +69,7 @@ impl Regression {
         }
     }
 
-    /// The same columns, which are to explain something else.
+    /// The same columns with another target.
     pub fn of_others(&self, others: Vec<Vec<f64>>) -> Self {
         Self {
             columns: Arc::clone(&self.columns),
@@ -89,7 +89,7 @@ impl Regression {
         self.grams[0].nrows()
     }
 
-    /// The solution with the expectation that predicts unseen samples best, and what it leaves of these.
+    /// The solution with the prior that predicts unseen samples best, and its cross-validated residuals.
     pub fn solve(&self) -> Option<(Solution, Vec<f64>)> {
         let solved = EXPECTED.iter().filter_map(|std| {
             let ridge = self.ridge(*std);
@@ -107,13 +107,13 @@ impl Regression {
         solved.min_by(|(_, a), (_, b)| sum(a).total_cmp(&sum(b)))
     }
 
-    /// What the free columns alone leave of samples that they have not seen.
+    /// Cross-validated residuals with the free columns alone.
     pub fn unseen_by_free_columns(&self) -> Option<Vec<f64>> {
         let without = self.without_each_fold(&self.ridge(NOTHING))?;
         Some(self.unseen(&without))
     }
 
-    /// Sum of squares, and of what the coefficients cost, that is left with some of the columns.
+    /// Penalised sum of squares with a subset of the columns.
     pub fn left_with(&self, solution: &Solution, is_in: impl Fn(usize) -> bool) -> Option<f64> {
         let (gram, right) = self.sums(None, &solution.ridge);
         let kept: Vec<usize> = (0..right.len()).filter(|k| is_in(*k)).collect();
@@ -123,7 +123,7 @@ impl Regression {
         Some(self.power() - found.dot(&right))
     }
 
-    /// What the squares of the coefficients cost where a function is expected to give so much of the record.
+    /// Penalties for a prior contribution of each function to the record.
     fn ridge(&self, expected: f64) -> DVector<f64> {
         let whole = self.power();
         let size = |k: usize| self.grams.iter().map(|gram| gram[(k, k)]).sum::<f64>();
@@ -137,7 +137,7 @@ impl Regression {
         DVector::from_fn(self.count(), |k, _| cost(k).max(f64::MIN_POSITIVE))
     }
 
-    /// Sum of squares of what is to be explained.
+    /// Sum of squares of the target.
     fn power(&self) -> f64 {
         self.targets.iter().map(|target| dot(target, target)).sum()
     }
@@ -165,7 +165,7 @@ impl Regression {
             .collect()
     }
 
-    /// What is left of each sample by the coefficients that were found without it.
+    /// Residual of each sample with the coefficients found without it.
     fn unseen(&self, without: &[DVector<f64>]) -> Vec<f64> {
         let mut all = Vec::new();
         for (columns, target) in self.columns.iter().zip(&self.targets) {
@@ -180,13 +180,13 @@ impl Regression {
 }
 
 impl Solution {
-    /// Takes what the columns explain out of samples.
+    /// Subtracts the fitted columns from samples.
     pub fn subtract(&self, columns: &[Vec<f64>], range: Range<usize>, left: &mut [f64]) {
         subtract(&self.coefficients, columns, range, left);
     }
 
-    /// Something that follows from the coefficients, each of its values with the standard uncertainty that it has by its scatter
-    /// between the folds (jackknife; B. Efron, *The Jackknife, the Bootstrap and Other Resampling Plans* (1982), 3).
+    /// Functions of the coefficients, with standard uncertainties from their scatter between the folds (jackknife; B.
+    /// Efron, *The Jackknife, the Bootstrap and Other Resampling Plans* (1982), 3).
     pub fn with_std(&self, of: impl Fn(&DVector<f64>) -> Vec<f64>) -> Vec<[f64; 2]> {
         let folds: Vec<Vec<f64>> = self.without.iter().map(&of).collect();
         let count = folds.len() as f64;
@@ -227,7 +227,7 @@ fn subtract(
     }
 }
 
-/// Consecutive stretches of a record.
+/// Consecutive segments of a record.
 fn stretches(count: usize) -> impl Iterator<Item = Range<usize>> {
     (0..STRETCHES).map(move |k| k * count / STRETCHES..(k + 1) * count / STRETCHES)
 }
@@ -237,7 +237,7 @@ mod tests {
     use super::*;
     use crate::diagnose::test_noise::noise;
 
-    /// `y = 2 a + 0.5 b` in noise of 0.1, beside 20 columns of noise.
+    /// `y = 2 a + 0.5 b` in noise of 0.1, with 20 further columns of noise.
     fn made() -> Regression {
         let mut noise = noise(1);
         let records = (0..2).map(|_| {
@@ -270,7 +270,7 @@ mod tests {
         let regression = made();
         let (solution, _) = regression.solve().unwrap();
         let left = |without: usize| regression.left_with(&solution, |k| k != without).unwrap();
-        // 0.5² · 4000/12 = 83 more without the second column, nothing without one of noise.
+        // 0.5² · 4000/12 = 83 more without the second column, no change without a noise column.
         assert!((left(1) - left(99) - 83.3).abs() < 12.0);
         assert!(left(7) - left(99) < 1.0);
     }

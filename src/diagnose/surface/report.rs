@@ -1,4 +1,4 @@
-//! A surface as it is reported: its curves with their uncertainties, and what they look like.
+//! Report of a surface: its curves with their uncertainties, and the laws that they resemble.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -11,7 +11,7 @@ use super::{PLAIN, Surface, SurfacePlace, seen};
 use crate::diagnose::describe::shows_torque;
 use crate::diagnose::score::ScoredModel;
 
-/// Share from which on a part of the surface is spoken of.
+/// Minimum share of a part of the surface that is mentioned.
 const SPOKEN_OF: f64 = 0.1;
 
 /// The torque that follows from the motion, that of accepted laws included, as a surface over displacement and speed, with a
@@ -64,7 +64,7 @@ pub struct SurfacePoint {
 }
 
 impl ForceSurface {
-    /// The record that would decide between the laws that come nearest.
+    /// The record that would decide between the closest laws.
     pub fn experiment(&self) -> &'static str {
         let shares = &self.shares;
         let of_displacement = shares.displacement.max(shares.history);
@@ -73,7 +73,7 @@ impl ForceSurface {
 }
 
 impl Surface {
-    /// The surface on the records on which a model is compared; `None` if these do not bear it out.
+    /// The surface on the records used for comparison; `None` if these do not confirm it.
     pub fn report(&self, model: &ScoredModel, outdoes_laws: bool) -> Option<ForceSurface> {
         let left = rms(&self.left_of_compared(model)?);
         if left >= rms(&seen(&model.compared)) {

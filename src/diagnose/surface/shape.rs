@@ -1,19 +1,19 @@
-//! What the curves of a surface look like.
+//! Classification of the curves of a surface by shape.
 
 use super::SurfacePlace;
 use super::line::clear_line;
 use super::report::SurfacePoint;
 
-/// Part of a curve's weighted power that a shape must explain to be named.
+/// Minimum fraction of a curve's weighted power that a named shape must explain.
 const ALIKE: f64 = 0.75;
-/// Uncertainty of a point, over the largest torque of its curve, that is always allowed for.
+/// Minimum uncertainty of a point, relative to the largest torque of its curve.
 const BLUR: f64 = 0.05;
-/// Half a gap, over the largest displacement, from which on it is a stop.
+/// Half-width of a gap, relative to the largest displacement, above which it is an end stop.
 const STOP: f64 = 0.35;
-/// Speeds within which friction falls that are tried, over the largest speed.
+/// Characteristic speeds tried for a drop of friction, relative to the largest speed.
 const FALLS: [f64; 3] = [0.05, 0.1, 0.2];
 
-/// What part of a surface looks like, and the effects and laws that come nearest.
+/// Shape of part of a surface, and the closest effects and laws.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Resemblance {
     pub words: String,
@@ -43,7 +43,7 @@ impl Resemblance {
     }
 }
 
-/// A curve that a shape is held against.
+/// A curve to be compared with a shape.
 struct Curve<'a> {
     points: &'a [SurfacePoint],
     weights: Vec<f64>,
@@ -62,7 +62,7 @@ impl<'a> Curve<'a> {
         }
     }
 
-    /// Amount of a shape, and the part of the curve's power that it explains; of both only what is no straight line.
+    /// Amount of a shape, and the fraction of the curve's power that it explains; both without straight lines.
     fn alike(&self, shape: impl Fn(f64) -> f64) -> (f64, f64) {
         let at: Vec<f64> = self.points.iter().map(|p| p.at).collect();
         let bent = |of: &dyn Fn(&SurfacePoint) -> f64| {
@@ -96,10 +96,10 @@ impl<'a> Curve<'a> {
     }
 }
 
-/// A curve with a corner, and the corners that are tried.
+/// A curve with a corner, and the corners tried.
 type CornerShape<'a> = (&'a dyn Fn(f64, f64) -> f64, &'a [f64]);
 
-/// What a torque over the displacement looks like.
+/// Resemblance of a torque over displacement.
 pub fn of_displacement(points: &[SurfacePoint], place: SurfacePlace) -> Resemblance {
     let cube = |x: f64, _: f64| x.powi(3);
     let square = |x: f64, _: f64| x * x;
@@ -153,7 +153,7 @@ pub fn of_displacement(points: &[SurfacePoint], place: SurfacePlace) -> Resembla
     }
 }
 
-/// What a torque over the speed looks like.
+/// Resemblance of a torque over speed.
 pub fn of_speed(points: &[SurfacePoint]) -> Resemblance {
     let direction = |v: f64, _: f64| if v == 0.0 { 0.0 } else { v.signum() };
     let square = |v: f64, _: f64| v * v.abs();
@@ -211,7 +211,7 @@ mod tests {
         let of = |torque: &dyn Fn(f64) -> f64| {
             of_displacement(&curve(torque), SurfacePlace::Stand).nearest[0]
         };
-        // The straight line is a matter of the stand's constants.
+        // The straight line belongs to the stand's constants.
         assert_eq!(of(&|x| 0.1 * x.powi(3) - 3.0 * x), "cubic-stiffness");
         assert_eq!(of(&|x| 0.2 * x * x + x), "quadratic-stiffness");
         assert_eq!(of(&|x| x - x.clamp(-0.4, 0.4)), "backlash");

@@ -1,4 +1,4 @@
-//! A search for the modes of a decay, one after the other.
+//! Incremental search for the modes of a decay.
 
 use torqcomp_model::fit::FitError;
 
@@ -11,22 +11,22 @@ use super::{baseline, first_period};
 use crate::identify::Pole;
 use crate::identify::hum::SteadyLine;
 
-/// Lines that are taken off, at most.
+/// Maximum number of lines removed.
 const MOST_LINES: usize = 8;
-/// Periods that are cut off the start of a decay, at most, once its modes are known.
+/// Maximum number of periods removed from the start of a decay, once its modes are known.
 const MOST_PERIODS: usize = 4;
 
-/// What was found so far.
+/// Current state of the search.
 pub(super) struct Attempt<'a> {
     pub fit: ModesFit,
-    /// Lines that were taken off.
+    /// Removed lines.
     pub lines: Vec<SteadyLine>,
-    /// Whether a baseline that moves was taken off.
+    /// Whether a moving baseline was removed.
     pub has_baseline: bool,
-    /// Whether another line than those of the mains is steady.
+    /// Whether a line other than the mains is steady.
     pub has_tone: bool,
     wanted: &'a ModeSearch,
-    /// Lines that were taken off before, and how many since.
+    /// Lines removed earlier, and number removed since.
     taken_off: (&'a [SteadyLine], usize),
     takes_tones: bool,
     /// Steady lines among the modes.
@@ -34,10 +34,10 @@ pub(super) struct Attempt<'a> {
 }
 
 impl<'a> Attempt<'a> {
-    /// Adds modes one by one as long as the criterion falls enough, each starting at the strongest line of the residual.
-    /// Lines that do not decay are taken off the stretches: those of the mains where they are found, others from the last
-    /// fit, in which the modes do not disturb them. So is what the recorder adds: a baseline that moves, and the start of a
-    /// decay in which a filter still follows the hit.
+    /// Adds modes one by one while the criterion falls enough, each starting at the strongest line of the residual.
+    /// Lines that do not decay are removed from the segments: mains lines where they are found, others from the last
+    /// fit, so that the modes do not bias them. Artefacts of the recorder are removed as well: a moving baseline, and
+    /// the start of a decay, where a filter still responds to the hit.
     ///
     /// # Errors
     /// [`FitError`] if there are too few samples.
@@ -71,7 +71,7 @@ impl<'a> Attempt<'a> {
         Ok(all)
     }
 
-    /// Whether more modes are searched for.
+    /// Whether to search for more modes.
     fn goes_on(&self, resolved: f64) -> bool {
         let modes = self.fit.poles.len() - self.tones.len();
         match self.wanted.count {
@@ -80,7 +80,7 @@ impl<'a> Attempt<'a> {
         }
     }
 
-    /// Takes the last line of a fit off if it is none of the stand's. Whether it is not.
+    /// Removes the last line of a fit if it is not a mode of the stand; returns whether it is not.
     fn is_recorders(
         &mut self,
         stretches: &mut [Stretch],
@@ -107,11 +107,12 @@ impl<'a> Attempt<'a> {
         Ok(is_filter)
     }
 
-    /// Takes a fit with one mode more, or a baseline off, if either is worth it. Whether it was.
+    /// Accepts a fit with one more mode, or removes a baseline, if either is worthwhile; returns
+    /// whether one was.
     fn is_taken(&mut self, stretches: &mut [Stretch], next: ModesFit) -> Result<bool, FitError> {
         let last = self.fit.poles.len();
         let is_clear = self.is_clear(&next, stretches);
-        // Beside a mode it is what its law of damping leaves.
+        // Next to a mode it is a residual of its damping law.
         let is_tone =
             is_clear && steady(&next, last, stretches).is_some() && close(&next.poles).is_none();
         self.has_tone |= is_tone;
@@ -141,7 +142,7 @@ impl<'a> Attempt<'a> {
         Ok(true)
     }
 
-    /// Takes a baseline off if it moves and none was before. Whether it did.
+    /// Removes a baseline if it moves and none was removed before; returns whether it did.
     fn has_more_baseline(&mut self, stretches: &mut [Stretch]) -> Result<bool, FitError> {
         let moves = !self.has_baseline && baseline::take_off(stretches, &self.fit, false);
         if moves {
@@ -151,7 +152,7 @@ impl<'a> Attempt<'a> {
         Ok(moves)
     }
 
-    /// Takes off what is left of the recorder, and the tones.
+    /// Removes the remaining recorder artefacts, and the tones.
     fn finish(&mut self, stretches: &mut [Stretch]) -> Result<(), FitError> {
         self.has_more_baseline(stretches)?;
         for _ in 0..MOST_PERIODS {
@@ -178,7 +179,7 @@ impl<'a> Attempt<'a> {
         self.refit(stretches)
     }
 
-    /// Fits the modes again to what the stretches have become.
+    /// Refits the modes to the current segments.
     fn refit(&mut self, stretches: &[Stretch]) -> Result<(), FitError> {
         self.fit = ModesFit {
             close_hz: self.fit.close_hz,
@@ -187,7 +188,7 @@ impl<'a> Attempt<'a> {
         Ok(())
     }
 
-    /// Whether one mode more lowers the error clearly.
+    /// Whether one more mode clearly reduces the error.
     fn is_clear(&self, next: &ModesFit, stretches: &[Stretch]) -> bool {
         gain(&self.fit, next, stretches) > LEAST_GAIN
             && next.fit.sum_of_squares < 0.98 * self.fit.fit.sum_of_squares

@@ -1,4 +1,4 @@
-//! A baseline that moves while the stand rings: an amplifier that is AC coupled or settles, a part that warms up.
+//! A moving baseline during a decay: an AC-coupled or settling amplifier, a part that warms up.
 
 use nalgebra::DMatrix;
 use torqcomp_model::fit::linear;
@@ -7,25 +7,27 @@ use super::modes::{ModesFit, Stretch};
 use super::turns::turns;
 use crate::identify::Pole;
 
-/// Periods of the slowest mode between two knots of the baseline: it cannot follow a mode.
+/// Spacing of the baseline's knots in periods of the slowest mode, so that it cannot follow a mode.
 const PERIODS: f64 = 6.0;
-/// How much slower than a mode, and damped by which ratio, a line is more likely a baseline than a mode.
+/// Frequency ratio to a mode, and damping ratio, beyond which a line is more likely a baseline than a
+/// mode.
 const SETTLES: (f64, f64) = (3.0, 0.1);
-/// Most intervals of a baseline.
+/// Maximum number of intervals of a baseline.
 const MOST_INTERVALS: usize = 100;
-/// Power of means over an interval, over what white noise of the residual's power has, above which the baseline moves.
+/// Power of the interval means, relative to that for white noise with the residual's power, above which the baseline
+/// moves.
 const MOVES: f64 = 10.0;
-/// Part of the residual's power that a baseline must explain.
+/// Minimum fraction of the residual's power that a baseline must explain.
 const WORTH: f64 = 0.2;
 
-/// Whether a line beside a mode looks like a part of a baseline.
+/// Whether a line next to a mode looks like part of a baseline.
 pub(super) fn is_slow(line: Pole, mode: Pole) -> bool {
     SETTLES.0 * line.omega_rad_per_s < mode.omega_rad_per_s && line.damping_ratio() > SETTLES.1
 }
 
-/// Takes the baselines off the stretches in which offset and drift do not describe them: cubic splines (uniform B-splines;
-/// C. de Boor, A Practical Guide to Splines, 1978), fitted together with the amplitudes of the modes; what is left of them, if
-/// some were taken off before. Whether there were any.
+/// Removes the baselines from the segments in which offset and drift are not sufficient: cubic splines (uniform
+/// B-splines; C. de Boor, A Practical Guide to Splines, 1978), fitted together with the amplitudes of the modes; the
+/// remaining baselines, if some were removed before. Returns whether there were any.
 pub(super) fn take_off(stretches: &mut [Stretch], found: &ModesFit, is_known: bool) -> bool {
     let mut is_any = false;
     for (stretch, residuals) in stretches.iter_mut().zip(&found.residuals) {
@@ -40,7 +42,7 @@ pub(super) fn take_off(stretches: &mut [Stretch], found: &ModesFit, is_known: bo
     is_any
 }
 
-/// The baseline of a stretch, if it moves or is known to.
+/// The baseline of a segment, if it moves or is known to.
 fn baseline(
     stretch: &Stretch,
     poles: &[Pole],
@@ -78,8 +80,8 @@ fn baseline(
     })
 }
 
-/// Intervals of a baseline that is slow beside the modes; without one, beside the strongest line of the differences of
-/// samples, in which what is slow is small.
+/// Number of intervals of a baseline that is slow compared with the modes; without modes, compared with the strongest
+/// line of the sample differences, which suppress slow components.
 fn intervals(stretch: &Stretch, poles: &[Pole], residuals: &[f64]) -> Option<usize> {
     let slowest_hz = poles.iter().map(Pole::frequency_hz).reduce(f64::min);
     let slowest_hz = slowest_hz.or_else(|| {
@@ -92,7 +94,7 @@ fn intervals(stretch: &Stretch, poles: &[Pole], residuals: &[f64]) -> Option<usi
     (intervals > 0 && stretch.bands_hz.is_empty()).then_some(intervals)
 }
 
-/// Whether the means over intervals scatter more than those of white noise would.
+/// Whether the means over intervals scatter more than for white noise.
 fn moves(residuals: &[f64], intervals: usize) -> bool {
     let length = residuals.len().div_ceil(intervals.max(2));
     let mean_square =
@@ -104,7 +106,7 @@ fn moves(residuals: &[f64], intervals: usize) -> bool {
     mean_square(&means) * length as f64 > MOVES * mean_square(residuals)
 }
 
-/// The four cubic B-splines at a place in units of the interval: the number of the first, and their values.
+/// The four cubic B-splines at a position in units of the interval: index of the first, and their values.
 fn cubic(place: f64, intervals: usize) -> (usize, [f64; 4]) {
     let first = (place as usize).min(intervals - 1);
     let x = place - first as f64;

@@ -1,4 +1,5 @@
-//! Frequency and damping read from a decay by hand: logarithmic decrement and half-power width.
+//! Frequency and damping of a decay by manual methods: logarithmic decrement and half-power
+//! bandwidth.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,12 +8,11 @@ use crate::identify::{Comparison, Identification, NamedEstimate};
 
 /// Peaks smaller than this part of the first are ignored.
 const SMALLEST: f64 = 0.05;
-/// Samples in a period below which half cycles have no three samples for a parabola.
+/// Minimum number of samples per period, so that half cycles have three samples for a parabola.
 const FEWEST: f64 = 8.0;
 
-/// Damped frequency in Hz and decay rate in 1/s from the heights of successive peaks: the slope of
-/// ln|peak| over time through all of them, by plain regression. `None` with fewer than three peaks, or too few samples to
-/// see them.
+/// Damped frequency in Hz and decay rate in 1/s from the heights of successive peaks: the slope of ln|peak| over time,
+/// by ordinary regression over all of them. `None` with fewer than three peaks, or too few samples to resolve them.
 pub(super) fn log_decrement(stretch: &Stretch, offset: f64, omega: f64) -> Option<(f64, f64)> {
     if TAU / omega < FEWEST * stretch.step_s() {
         return None;
@@ -36,8 +36,8 @@ pub(super) fn log_decrement(stretch: &Stretch, offset: f64, omega: f64) -> Optio
     Some((frequency_hz, -top / bottom))
 }
 
-/// Time and size of the peak of every half cycle, from a parabola through three samples, down to [`SMALLEST`] times
-/// the first.
+/// Time and magnitude of the peak of every half cycle, from a parabola through three samples, down to [`SMALLEST`]
+/// times the first.
 fn peaks_of(stretch: &Stretch, offset: f64, half_period_s: f64) -> Vec<(f64, f64)> {
     let values: Vec<f64> = stretch.values.iter().map(|v| v - offset).collect();
     let times = &stretch.times_s;
@@ -75,12 +75,12 @@ fn peaks_of(stretch: &Stretch, offset: f64, half_period_s: f64) -> Vec<(f64, f64
     found
 }
 
-/// Frequency in Hz and damping ratio from the width of the spectrum's peak at half its power,
-/// ζ = Δf/2f. Too large where the record ends before the decay does. `None` without a peak.
+/// Frequency in Hz and damping ratio from the half-power bandwidth of the spectral peak, ζ = Δf/2f.
+/// Too large where the record ends before the decay does. `None` without a peak.
 pub(super) fn half_power(stretch: &Stretch, offset: f64, omega: f64) -> Option<(f64, f64)> {
     let values: Vec<f64> = stretch.values.iter().map(|v| v - offset).collect();
     let near = omega / TAU;
-    // Eightfold padding draws the peak finely enough.
+    // Eightfold zero-padding resolves the peak.
     let mut padded = values;
     padded.resize(padded.len().min(1 << 17) * 8, 0.0);
     let peak = stretch.strongest(&padded, 0.7 * near..1.4 * near)?;

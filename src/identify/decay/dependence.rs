@@ -1,4 +1,4 @@
-//! Checks whether one damping ratio describes a decay: the law of its envelope, and its change with amplitude.
+//! Tests whether one damping ratio describes a decay: the law of its envelope, and its change with amplitude.
 
 use super::laws::{self, Law};
 use super::modes::{self, ModesFit, Stretch};
@@ -6,13 +6,13 @@ use crate::failure::Failure;
 use crate::identify::Identification;
 use crate::print::rounded;
 
-/// Minimum reduction of the criterion for another law than viscous damping.
+/// Minimum reduction of the criterion for a law other than viscous damping.
 const CLEARLY: f64 = 10.0;
 
-/// Minimum relative reduction of the residual, besides.
+/// Minimum relative reduction of the residual, in addition.
 const WORTHWHILE: f64 = 0.01;
 
-/// Fits the laws of damping to the longest stretch and warns if viscous damping is clearly not the best.
+/// Fits the damping laws to the longest segment and warns if viscous damping is clearly not the best.
 pub(super) fn damping_law(
     result: &mut Identification,
     fit: &ModesFit,
@@ -52,10 +52,10 @@ pub(super) fn damping_law(
     Ok(())
 }
 
-/// Smallest relative change of decay rate and of frequency between the halves of a decay that is reported.
+/// Smallest reported relative change of decay rate and of frequency between the halves of a decay.
 const NOTABLE: [f64; 2] = [0.02, 1e-4];
 
-/// The same in their standard uncertainties.
+/// The same in standard uncertainties.
 const CHANGED: f64 = 4.0;
 
 /// Fits the early and the late half (in amplitude) separately and compares them.
@@ -72,7 +72,7 @@ pub(super) fn amplitude_dependence(
     let Some(stretch) = stretches.iter().max_by_key(|s| s.values.len()) else {
         return;
     };
-    // Half way (in decibels) from the first amplitude to the noise.
+    // Halfway (in decibels) from the initial amplitude to the noise.
     let noise = fit.fit.rms.max(1e-300);
     let amplitude = fit.amplitude(main, 0).max(noise);
     let down = 0.5 * (amplitude / noise).ln().clamp(0.5, 3.0) / pole.rate_per_s.max(1e-12);
@@ -88,7 +88,7 @@ pub(super) fn amplitude_dependence(
     compare_halves(result, &early, &late);
 }
 
-/// Warns about differences between the halves that their uncertainties do not explain.
+/// Warns about significant differences between the halves.
 fn compare_halves(result: &mut Identification, early: &ModesFit, late: &ModesFit) {
     for (i, what) in ["decay rate", "frequency"].into_iter().enumerate() {
         let (Some(a), Some(b)) = (early.fit.std[i], late.fit.std[i]) else {

@@ -1,20 +1,21 @@
-//! The start of a decay, where a filter of the recorder still follows the hit, or the hammer is still in contact.
+//! Start of a decay, where a filter of the recorder still responds to the hit, or the hammer is still in contact.
 
 use super::modes::{ModesFit, Stretch};
 use crate::identify::{Pole, rms};
 
-/// Residual in the first period of a decay, over that in the next three, above which it is not free ringing yet.
+/// Ratio of the residual in the first period to that in the next three, above which the decay is not free yet.
 pub(super) const TOO_LARGE: f64 = 2.5;
-/// The same where a line is there that looks like the answer of a filter.
+/// The same if a line looks like a filter response.
 pub(super) const LARGER: f64 = 1.2;
-/// Periods that it is compared with.
+/// Number of periods that it is compared with.
 const NEXT: usize = 3;
-/// Fewest samples in a period, and periods in a decay, with which it is looked at.
+/// Minimum number of samples per period, and of periods in a decay.
 const FEWEST: (usize, usize) = (6, 12);
-/// Damping ratio and decay within a period of the mode beside it, as an exponent, above which a line is no mode, but this.
+/// Damping ratio, and decay exponent within a period of the neighbouring mode, above which a line is a transient rather
+/// than a mode.
 const TRANSIENT: (f64, f64) = (0.1, 3.0);
 
-/// Whether a line beside a mode looks like the answer of a filter, which is gone within a period.
+/// Whether a line next to a mode looks like a filter response, which decays within a period.
 pub(super) fn is_transient(line: Pole, mode: Pole) -> bool {
     let decay = line.rate_per_s / mode.frequency_hz();
     let damping_ratio = line.rate_per_s / line.rate_per_s.hypot(line.omega_rad_per_s);
@@ -23,7 +24,8 @@ pub(super) fn is_transient(line: Pole, mode: Pole) -> bool {
         && decay > TRANSIENT.1
 }
 
-/// Cuts the first period of the strongest mode off the stretches in which the fit fails there. Whether there were any.
+/// Removes the first period of the strongest mode from the segments in which the fit fails there; returns whether
+/// there were any.
 pub(super) fn cut_off(stretches: &mut [Stretch], found: &ModesFit, too_large: f64) -> bool {
     let order = found.by_strength(stretches.len());
     let Some(main) = order.first().map(|k| found.poles[*k]) else {

@@ -1,6 +1,6 @@
-//! The damping law that the envelope of a single mode follows.
+//! Damping laws of the envelope of a single mode.
 //!
-//! Slowly falling amplitude of x'' + ω² x = −(damping) (A. H. Nayfeh, D. T. Mook, Nonlinear
+//! Slowly varying amplitude of x'' + ω² x = −(damping) (A. H. Nayfeh, D. T. Mook, Nonlinear
 //! Oscillations, 1979, 3.3; averaging over a cycle):
 //!
 //! | law | A(t) |
@@ -39,7 +39,7 @@ pub enum Law {
 }
 
 impl Law {
-    /// All laws, simple ones first.
+    /// All laws, simplest first.
     const ALL: [Self; 5] = [
         Self::Viscous,
         Self::Dry,
@@ -48,7 +48,7 @@ impl Law {
         Self::ViscousAndQuadratic,
     ];
 
-    /// Name for people and JSON.
+    /// Name for text and JSON.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -60,7 +60,7 @@ impl Law {
         }
     }
 
-    /// Whether it has a viscous, a dry and a quadratic part.
+    /// Whether it has a viscous, a dry and a quadratic term.
     fn parts(self) -> [bool; 3] {
         match self {
             Self::Viscous => [true, false, false],
@@ -146,18 +146,18 @@ pub struct LawFit {
     is_complete: bool,
 }
 
-/// The viscous fit from which the laws start.
+/// The viscous fit that provides the start values.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ViscousFit {
     /// Its mode.
     pub pole: Pole,
     /// a, b, c and d of the stretch.
     pub linear: [f64; 4],
-    /// Power of the noise at the mode over that of white noise with its variance.
+    /// Noise power at the mode, relative to white noise of the same variance.
     pub relative_density: f64,
 }
 
-/// Fits a law to a stretch with one mode.
+/// Fits a law to a segment with one mode.
 fn fit(law: Law, stretch: &Stretch, viscous: &ViscousFit) -> Result<LawFit, FitError> {
     let parameters = parameters(law, stretch, viscous.pole, viscous.linear);
     let residuals = |p: &[f64], out: &mut Vec<f64>| {
@@ -202,7 +202,7 @@ fn fit(law: Law, stretch: &Stretch, viscous: &ViscousFit) -> Result<LawFit, FitE
     Ok(summed(law, &fit, viscous.relative_density))
 }
 
-/// Amplitude, ω, phase, offset, drift, σ, s and β with their starts and bounds.
+/// Amplitude, ω, phase, offset, drift, σ, s and β with their start values and bounds.
 fn parameters(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> [Parameter; 8] {
     let [a, b, offset, drift] = start;
     let amplitude = a.hypot(b).max(f64::MIN_POSITIVE);
@@ -246,7 +246,8 @@ fn summed(law: Law, fit: &Fit, relative_density: f64) -> LawFit {
     }
 }
 
-/// The laws by rising criterion, without those of which a part vanishes: a simpler law is the same.
+/// The laws in ascending order of the criterion, without those of which a term vanishes, as a
+/// simpler law is equivalent.
 ///
 /// # Errors
 /// [`FitError`] if a law cannot be fitted.

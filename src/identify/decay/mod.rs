@@ -23,12 +23,12 @@ use modes::ModesFit;
 pub use modes::Stretch;
 use search::ModeSearch;
 
-/// A recording with decays in it.
+/// A recording that contains decays.
 #[derive(Debug, Clone, Copy)]
 pub struct Ringing<'a> {
     /// Name of the recording, for messages.
     pub name: &'a str,
-    /// Times in seconds, rising; they need not be uniform.
+    /// Ascending times in seconds, not necessarily uniform.
     pub times_s: &'a [f64],
     /// Sampling rate, if the times are uniform.
     pub rate_hz: Option<f64>,
@@ -36,7 +36,7 @@ pub struct Ringing<'a> {
     pub values: &'a [f64],
 }
 
-/// How decays are evaluated.
+/// Options for the evaluation of decays.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct DecayOptions {
     /// Number of modes; chosen from the data if not given.
@@ -45,14 +45,13 @@ pub struct DecayOptions {
     pub band_hz: Option<(f64, f64)>,
 }
 
-/// Most modes searched for.
+/// Maximum number of modes searched for.
 const MOST_MODES: usize = 12;
 
-/// Evaluates one or several recordings of the free ringing of one stand; the result, and the stretches that were
-/// fitted.
+/// Evaluates one or several recordings of free decays of one stand; returns the result and the fitted segments.
 ///
 /// # Errors
-/// If nothing rings, or the decays are too short.
+/// If there is no decay, or the decays are too short.
 pub fn identify(
     records: &[Ringing],
     options: &DecayOptions,
@@ -107,10 +106,10 @@ pub fn identify(
     Ok((result, stretches))
 }
 
-/// Warns about a record that is hardly one free decay after each hit.
+/// Warns about a record that is not a single free decay after each hit.
 ///
 /// # Errors
-/// If nothing rings.
+/// If there is no decay.
 pub fn check(record: &Ringing) -> Result<Vec<Warning>, Failure> {
     let (found, _) = identify(std::slice::from_ref(record), &DecayOptions::default())?;
     let mut doubts: Vec<Warning> = found.warnings;
@@ -119,11 +118,11 @@ pub fn check(record: &Ringing) -> Result<Vec<Warning>, Failure> {
     Ok(doubts)
 }
 
-/// What a restart means where a decay is fitted as a whole.
+/// Consequence of a restart where a decay is fitted as a whole.
 const NOT_ONE: &str = "a hand or a brake that was put on the stand would look the same, and the decay does not follow from one \
                        state at its start; cut the record there with --range";
 
-/// The residual, over the swing about offset and drift.
+/// The residual, relative to the oscillation about offset and drift.
 fn quality(fit: &ModesFit, stretches: &[Stretch]) -> FitQuality {
     let swing: Vec<f64> = (0..stretches.len())
         .flat_map(|s| fit.swing(stretches, s))

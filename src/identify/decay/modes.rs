@@ -1,11 +1,11 @@
-//! Sums of decaying sines through one or several stretches of free ringing.
+//! Sums of decaying sines fitted to one or several segments of free decay.
 //!
 //! ```text
 //! x(t) = Σ e^{−σ_k t} (a_k cos ω_k t + b_k sin ω_k t) + c + d t
 //! ```
 //!
-//! Decay rates and frequencies belong to the stand and are common to all stretches; amplitudes, offset
-//! and drift belong to each stretch. Uncertainties allow for the colour of the noise ([`crate::noise_colour`]).
+//! Decay rates and frequencies belong to the stand and are common to all segments; amplitudes, offset and drift
+//! belong to each segment. Uncertainties allow for coloured noise ([`crate::noise_colour`]).
 
 use std::ops::Range;
 use torqcomp_dsp::sort_by_number;
@@ -20,7 +20,7 @@ use super::turns::turns;
 use crate::identify::Pole;
 use crate::noise_colour::{self, NoiseColour};
 
-/// A stretch of free ringing.
+/// A segment of a free decay.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stretch {
     /// Start on the time axis of the recording, in seconds.
@@ -29,13 +29,13 @@ pub struct Stretch {
     pub times_s: Vec<f64>,
     /// Samples.
     pub values: Vec<f64>,
-    /// Bands in Hz to which the frequencies of a stretch with fewer than two samples a period are limited; none if all
-    /// below half its rate is in it.
+    /// Frequency bands in Hz of an undersampled segment; empty if all frequencies below its Nyquist frequency are
+    /// allowed.
     pub bands_hz: Vec<Range<f64>>,
 }
 
 impl Stretch {
-    /// Samples at these times, of which there is at least one.
+    /// A segment from its times, at least one, and samples.
     pub(super) fn new(times_s: &[f64], values: Vec<f64>) -> Self {
         let start_s = times_s[0];
         Self {
@@ -46,7 +46,7 @@ impl Stretch {
         }
     }
 
-    /// Some of its samples.
+    /// Part of the segment.
     pub(super) fn part(&self, range: Range<usize>) -> Self {
         Self {
             bands_hz: self.bands_hz.clone(),
@@ -54,7 +54,7 @@ impl Stretch {
         }
     }
 
-    /// What is left of it without its first samples.
+    /// The segment without its first samples.
     pub(super) fn later(&self, first: usize) -> Self {
         let part = self.part(first..self.values.len());
         Self {
@@ -68,7 +68,8 @@ impl Stretch {
         (self.times_s.len() - 1) as f64 / self.times_s.last().copied().unwrap_or(1.0)
     }
 
-    /// The strongest line of samples at its rate between two frequencies; of several bands, what stands out most.
+    /// The strongest line of samples at its rate between two frequencies; with several bands, the most prominent
+    /// one.
     pub(super) fn strongest(&self, samples: &[f64], within_hz: Range<f64>) -> Option<Peak> {
         let rate_hz = self.rate_hz();
         if self.bands_hz.is_empty() {
@@ -90,7 +91,7 @@ impl Stretch {
         peaks.max_by(|a, b| a.prominence.total_cmp(&b.prominence))
     }
 
-    /// Lowest and highest angular frequency that the samples tell from this one.
+    /// Lowest and highest angular frequency that the samples distinguish from this one.
     fn limits_rad_per_s(&self, omega: f64) -> (f64, f64) {
         let tau = std::f64::consts::TAU;
         let distance = |band: &&Range<f64>| {
@@ -113,7 +114,7 @@ impl Stretch {
     }
 }
 
-/// Highest frequency of a line, over the rate.
+/// Highest frequency of a line, relative to the sampling rate.
 const HIGHEST: f64 = 0.49;
 
 /// A fit of a number of modes.
@@ -121,20 +122,21 @@ const HIGHEST: f64 = 0.49;
 pub(super) struct ModesFit {
     /// The modes, the strongest first.
     pub poles: Vec<Pole>,
-    /// The fit; parameters are σ and ω of each mode, then for each stretch a and b of each mode, c, d.
+    /// The fit; its parameters are σ and ω of each mode, then for each segment a and b of each mode,
+    /// c, d.
     pub fit: Fit,
-    /// Residuals of each stretch, model less data.
+    /// Residuals of each segment, model minus data.
     pub residuals: Vec<Vec<f64>>,
-    /// Colour of the noise in each stretch.
+    /// Colour of the noise in each segment.
     pub colours: Vec<NoiseColour>,
     /// Frequency in Hz of a line that was rejected as too close to a mode.
     pub close_hz: Option<f64>,
 }
 
-/// Linear parameters of a stretch besides amplitudes: offset and drift.
+/// Number of linear parameters of a segment other than amplitudes: offset and drift.
 const TREND: usize = 2;
 
-/// The problem for the nonlinear fit.
+/// The nonlinear fit problem.
 struct SineSum<'a> {
     stretches: &'a [Stretch],
     modes: usize,
@@ -197,7 +199,7 @@ impl Residuals for SineSum<'_> {
     }
 }
 
-/// Amplitudes, offset and drift of a stretch for given poles, and the residuals.
+/// Amplitudes, offset and drift of a segment for given poles, and the residuals.
 pub(super) fn linear_part(
     stretch: &Stretch,
     poles: &[Pole],
@@ -232,7 +234,7 @@ pub(super) fn linear_part(
     Ok((values, fit.residuals))
 }
 
-/// Fits the modes from given starts.
+/// Fits the modes from given start values.
 ///
 /// # Errors
 /// [`FitError`] if there are too few samples.
@@ -272,11 +274,12 @@ pub(super) fn fit(stretches: &[Stretch], starts: &[Pole]) -> Result<ModesFit, Fi
     with_colour(fit, &problem, 0)
 }
 
-/// The same fit with standard uncertainties of frequencies and damping that also hold where the noise has the colour of the
-/// modes. What is no noise, but a stand that is not linear, counts as such noise, so that nothing is judged by them.
+/// The same fit with standard uncertainties of frequencies and damping that remain valid where the noise spectrum peaks
+/// at the modes. Nonlinearity of the stand also counts as such noise, so these uncertainties are not used for
+/// decisions.
 ///
 /// # Errors
-/// [`FitError`] as of a fit.
+/// [`FitError`] as for a fit.
 pub(super) fn with_honest_std(
     found: &ModesFit,
     stretches: &[Stretch],
@@ -286,7 +289,7 @@ pub(super) fn with_honest_std(
     with_colour(found.fit.clone(), &problem, 2 * modes)
 }
 
-/// Lowest and highest angular frequency that all stretches tell from this one.
+/// Lowest and highest angular frequency that all segments distinguish from this one.
 fn limits_rad_per_s(stretches: &[Stretch], omega: f64) -> (f64, f64) {
     let each = stretches.iter().map(|s| s.limits_rad_per_s(omega));
     each.fold((0.0, f64::INFINITY), |all, one| {
@@ -294,7 +297,7 @@ fn limits_rad_per_s(stretches: &[Stretch], omega: f64) -> (f64, f64) {
     })
 }
 
-/// The fit with its covariance for the colour of the noise.
+/// The fit with its covariance for coloured noise.
 fn with_colour(mut fit: Fit, problem: &SineSum, wanted: usize) -> Result<ModesFit, FitError> {
     let stretches = problem.stretches;
     let mut residuals = Vec::new();
@@ -334,10 +337,10 @@ fn with_colour(mut fit: Fit, problem: &SineSum, wanted: usize) -> Result<ModesFi
     })
 }
 
-/// Relative difference of sampling intervals that count as one.
+/// Relative difference below which sampling intervals are equal.
 const SAME_STEP: f64 = 1e-3;
 
-/// Neighbouring stretches with the same sampling rate.
+/// Adjacent segments with the same sampling rate.
 fn of_one_rate(stretches: &[Stretch]) -> Vec<Range<usize>> {
     let is_same = |a: &Stretch, b: &Stretch| (a.step_s() / b.step_s() - 1.0).abs() < SAME_STEP;
     let mut from = 0;
@@ -351,19 +354,19 @@ fn of_one_rate(stretches: &[Stretch]) -> Vec<Range<usize>> {
 }
 
 impl ModesFit {
-    /// Power of the noise at a frequency over that of white noise with its variance, in a stretch.
+    /// Noise power at a mode in a segment, relative to white noise of the same variance.
     pub(super) fn relative_density(&self, stretches: &[Stretch], s: usize, pole: Pole) -> f64 {
         self.colours[s].relative_density(pole.omega_rad_per_s * stretches[s].step_s())
     }
 
-    /// Initial amplitude of a mode in a stretch.
+    /// Initial amplitude of a mode in a segment.
     pub fn amplitude(&self, mode: usize, stretch: usize) -> f64 {
         let modes = self.poles.len();
         let at = 2 * modes + stretch * (2 * modes + TREND) + 2 * mode;
         self.fit.values[at].hypot(self.fit.values[at + 1])
     }
 
-    /// What a mode contributes to a stretch.
+    /// Contribution of a mode to a segment.
     pub fn part(&self, stretches: &[Stretch], mode: usize, stretch: usize) -> Vec<f64> {
         let modes = self.poles.len();
         let at = 2 * modes + stretch * (2 * modes + TREND) + 2 * mode;
@@ -393,14 +396,14 @@ impl ModesFit {
         value
     }
 
-    /// Offset and drift per second of a stretch.
+    /// Offset, and drift per second, of a segment.
     pub fn trend(&self, stretch: usize) -> (f64, f64) {
         let modes = self.poles.len();
         let at = 2 * modes + stretch * (2 * modes + TREND) + 2 * modes;
         (self.fit.values[at], self.fit.values[at + 1])
     }
 
-    /// The samples of a stretch about offset and drift.
+    /// The samples of a segment about offset and drift.
     pub fn swing(&self, stretches: &[Stretch], stretch: usize) -> Vec<f64> {
         let (offset, drift) = self.trend(stretch);
         let Stretch {
@@ -410,7 +413,7 @@ impl ModesFit {
         pairs.map(|(t, y)| y - offset - drift * t).collect()
     }
 
-    /// The fitted curve of a stretch.
+    /// The fitted curve of a segment.
     pub fn curve(&self, stretches: &[Stretch], stretch: usize) -> Vec<f64> {
         let data = &stretches[stretch].values;
         data.iter()
@@ -419,7 +422,7 @@ impl ModesFit {
             .collect()
     }
 
-    /// Modes by falling energy, amplitude²/σ, over all stretches.
+    /// Modes in descending order of energy, amplitude²/σ, over all segments.
     pub fn by_strength(&self, stretches: usize) -> Vec<usize> {
         let energy = |k: usize| -> f64 {
             (0..stretches)

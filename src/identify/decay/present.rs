@@ -10,7 +10,7 @@ use crate::identify::{self, Identification};
 use crate::print::{plural, rounded};
 use crate::warning::Warning;
 
-/// Warns about what makes the fit doubtful.
+/// Warns about reasons to doubt the fit.
 pub(super) fn fit_warnings(result: &mut Identification, fit: &ModesFit) {
     if let Some(frequency_hz) = fit.close_hz {
         result.warn(
@@ -39,7 +39,7 @@ pub(super) fn fit_warnings(result: &mut Identification, fit: &ModesFit) {
     }
 }
 
-/// Why a record has no mode.
+/// Error for a record without a mode.
 pub(super) fn no_mode(lines: &[SteadyLine]) -> Failure {
     let but = match lines {
         [] => String::new(),
@@ -58,10 +58,10 @@ pub(super) fn no_mode(lines: &[SteadyLine]) -> Failure {
     )
 }
 
-/// Restarts that are named.
+/// Maximum number of restarts listed.
 const NAMED: usize = 5;
 
-/// The warning about decays that start again in their midst, and what follows from it.
+/// Warning about decays that restart, and the consequence.
 pub(super) fn restart(times_s: &[f64], consequence: &str) -> Option<Warning> {
     if times_s.is_empty() {
         return None;
@@ -100,12 +100,13 @@ pub(super) fn beginnings(result: &mut Identification, all: &[Beginning]) {
     }
 }
 
-/// Relative distance of modes that can be one mode of two stands.
+/// Relative frequency difference of modes that may be one mode of two stands.
 const NEAR: f64 = 0.25;
-/// Amplitude of a mode in a decay where another one rings instead of it, over that where it rings.
+/// Amplitude of a mode in a decay in which another one rings in its place, relative to that where
+/// it rings.
 const ABSENT: f64 = 0.1;
 
-/// Warns if decays show different modes in the place of one.
+/// Warns if decays show different modes in place of one.
 pub(super) fn apart(result: &mut Identification, fit: &ModesFit, stretches: usize) {
     let modes = 0..fit.poles.len();
     let rings =
@@ -135,16 +136,18 @@ pub(super) fn apart(result: &mut Identification, fit: &ModesFit, stretches: usiz
     }
 }
 
-/// Residual of a free decay, over its swing in the first decay time, above which the fit is poor.
+/// Residual of a free decay, relative to its oscillation in the first time constant, above which
+/// the fit is poor.
 const POOR: f64 = 0.3;
-/// The same where the residual falls with the ringing, and its size in the ringing part over that behind it.
+/// The same where the residual falls with the oscillation, and ratio of the residual during the decay to
+/// that after it.
 const FALLING: (f64, f64) = (0.03, 4.0);
-/// The same beside a baseline that was taken off.
+/// The same with a removed baseline.
 const FALLING_BESIDE: (f64, f64) = (0.0, 1.3);
-/// Decay times after which ringing has ended, and a decay must last for there to be more of it.
+/// Time constants after which a decay has ended, and minimum duration of a longer one.
 const RUNG: f64 = 3.0;
 
-/// Warns if the record is hardly a decay of those modes.
+/// Warns if the record does not look like a decay of those modes.
 pub(super) fn poor(
     result: &mut Identification,
     fit: &ModesFit,
@@ -183,7 +186,8 @@ pub(super) fn poor(
     }
 }
 
-/// Residual over swing in the first decay time of the stretches: what is quiet behind it has no swing but noise.
+/// Residual relative to the oscillation in the first time constant of the segments; afterwards there is only
+/// noise.
 fn while_ringing(fit: &ModesFit, stretches: &[Stretch], main: usize) -> f64 {
     let rung_s = 1.0 / fit.poles[main].rate_per_s.max(f64::MIN_POSITIVE);
     let (mut residual, mut swing) = (Vec::new(), Vec::new());
@@ -195,7 +199,8 @@ fn while_ringing(fit: &ModesFit, stretches: &[Stretch], main: usize) -> f64 {
     identify::rms(&residual) / identify::rms(&swing)
 }
 
-/// Residual of the first stretch while it rings, over that behind; 0 if it ends before.
+/// Ratio of the residual of the first segment during the decay to that after it; 0 if the segment
+/// ends before.
 fn falls(fit: &ModesFit, stretches: &[Stretch], main: usize) -> f64 {
     let rung_s = RUNG / fit.poles[main].rate_per_s.max(f64::MIN_POSITIVE);
     let ratio = |(stretch, residuals): (&Stretch, &Vec<f64>)| {
@@ -219,11 +224,11 @@ pub(super) fn method(fit: &ModesFit, stretches: usize) -> String {
     )
 }
 
-/// What is said of a baseline that was taken off.
+/// Note about a removed baseline.
 pub(super) const BASELINE: &str = "the zero moves while the stand rings (an amplifier that is AC coupled or settles, a part that \
                                    warms up): it was fitted with a smooth curve and taken off";
 
-/// Names the decay rates and frequencies that are strongly correlated.
+/// Reports strongly correlated decay rates and frequencies.
 pub(super) fn correlations(result: &mut Identification, fit: &ModesFit) {
     let name = |i: usize| {
         let what = ["decay rate", "frequency"][i % 2];
@@ -236,7 +241,7 @@ pub(super) fn correlations(result: &mut Identification, fit: &ModesFit) {
     result.correlations.extend(strong);
 }
 
-/// The longest stretch with its fit, and the residual.
+/// Plots the longest segment with its fit, and the residual.
 pub(super) fn draw(result: &mut Identification, fit: &ModesFit, stretches: &[Stretch]) {
     let Some(s) = (0..stretches.len()).max_by_key(|s| stretches[*s].values.len()) else {
         return;

@@ -1,10 +1,9 @@
-//! Moments at which a decay starts again: a second hit that does not raise the swing, samples that are missing, the end of
-//! an overload.
+//! Restarts within a decay: a second hit that does not raise the amplitude, missing samples, the end of an overload.
 //!
-//! A sum of decaying sines with an offset obeys a linear recursion, `x_i = c + Σ a_k x_{i−k}`, whatever its modes are. It is
-//! fitted by least squares to the whole stretch; what is left is noise, and the larger the less linear the stand is, so that
-//! it falls with the swing. Where it jumps up instead, the ringing starts again. Neighbouring samples are averaged before, to
-//! about [`A_PERIOD`] in a period of the strongest line: means of decaying sines are decaying sines.
+//! A sum of decaying sines with an offset obeys a linear recursion, `x_i = c + Σ a_k x_{i−k}`, whatever its modes. It
+//! is fitted by least squares to the whole segment; the residual is noise plus nonlinearity of the stand, and falls
+//! with the amplitude. A jump of the residual marks a restart. Samples are first averaged to about [`A_PERIOD`] per
+//! period of the strongest line: means of decaying sines are decaying sines.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -14,26 +13,28 @@ use torqcomp_dsp::{peaks, quality};
 
 /// Order of the recursion.
 const ORDER: usize = 16;
-/// Averaged samples in a period of the strongest line.
+/// Averaged samples per period of the strongest line.
 const A_PERIOD: f64 = 20.0;
-/// Averaged samples before a moment that it is compared with.
+/// Number of averaged samples before a moment used for comparison.
 const BEFORE: usize = 160;
-/// Averaged samples at the start of a stretch among which those before the decay are looked for, with the order.
+/// Averaged samples at the start of a segment, including the order, that are searched for samples preceding the
+/// decay.
 const LEAD: usize = 4 * ORDER;
-/// Swing of such a start, over that of the whole, below which it is at rest.
+/// Oscillation amplitude of such a start, relative to the whole, below which it is at rest.
 const AT_REST: f64 = 0.3;
-/// What is left at a restart, over the largest before it …
+/// Residual at a restart, relative to the largest before it …
 const JUMP: f64 = 5.0;
-/// … in standard deviations of all that is left …
+/// … in standard deviations of the whole residual …
 const NOISE: f64 = 10.0;
-/// … and over the largest swing.
+/// … and relative to the largest amplitude.
 const SIZE: f64 = 0.01;
-/// Swing of a part over that of the whole below which it does not ring.
+/// Amplitude of a part, relative to the whole, below which it does not ring.
 const STILL: f64 = 0.01;
-/// Added to the diagonal of the equations, relative to it, where samples without noise need no such order.
+/// Relative ridge term of the normal equations, for noise-free samples of lower order.
 const RIDGE: f64 = 1e-12;
 
-/// The parts of a stretch, in samples: the whole, or those before and after each restart that ring and have `least` samples.
+/// The parts of a segment, in samples: the whole, or those before and after each restart that ring and have at least
+/// `least` samples.
 pub(super) fn parts(values: &[f64], least: usize) -> Vec<Range<usize>> {
     let factor = averaged(values);
     let few: Cow<[f64]> = match factor {
@@ -54,8 +55,8 @@ pub(super) fn parts(values: &[f64], least: usize) -> Vec<Range<usize>> {
     all
 }
 
-/// Samples at the start of a stretch that are not of the decay yet, as of a preload that is let go a little later: the recursion
-/// fails until the last of them is behind it, and holds from there on.
+/// Number of samples at the start of a segment before the decay begins, as with a preload released a little later: the
+/// recursion fails until the last of them has passed, and holds from then on.
 pub(super) fn lead(values: &[f64]) -> usize {
     let factor = averaged(values);
     let few: Cow<[f64]> = match factor {
@@ -67,7 +68,7 @@ pub(super) fn lead(values: &[f64]) -> usize {
     };
     let settled = LEAD.min(left.len())..(LEAD + BEFORE).min(left.len());
     let later = left[settled].iter().copied().fold(0.0, f64::max);
-    // To take a sample too many for the preload costs little.
+    // One sample too many costs little.
     let least = (0.5 * NOISE * noise).max(1.5 * later);
     let mut at_start = ORDER..LEAD.min(left.len());
     let last = at_start.rfind(|i| left[*i] > least);
@@ -78,7 +79,7 @@ pub(super) fn lead(values: &[f64]) -> usize {
     }
 }
 
-/// With the standard deviation of most of what is left.
+/// With the standard deviation of most of the residual.
 fn with_noise(left: Vec<f64>) -> (Vec<f64>, f64) {
     let noise = quality::median(&mut left[ORDER..].to_vec()).unwrap_or(0.0) / 0.674_489_75;
     (left, noise)
@@ -88,25 +89,25 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Half the difference of the largest and the smallest value.
+/// Half the peak-to-peak value.
 fn swing(values: &[f64]) -> f64 {
     let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let low = values.iter().copied().fold(f64::INFINITY, f64::min);
     0.5 * (high - low).max(0.0)
 }
 
-/// Samples of which a mean is taken.
+/// Number of samples per average.
 fn averaged(values: &[f64]) -> usize {
     let middle = mean(values);
     let about = peaks::looked_at(values).iter().map(|v| v - middle);
     let about: Vec<f64> = about.collect();
-    // In periods a sample, from two periods in the stretch on.
+    // In cycles per sample, from two periods in the segment on.
     let lowest = 2.0 / values.len() as f64;
     let line = peaks::strongest(&about, 1.0, lowest, 0.5).map_or(0.5, |peak| peak.frequency_hz);
     ((1.0 / (A_PERIOD * line)) as usize).max(1)
 }
 
-/// From each restart to where the recursion holds again.
+/// Ranges from each restart to where the recursion holds again.
 fn restarts(values: &[f64]) -> Vec<Range<usize>> {
     let Some((left, noise)) = unpredicted(values, 0).map(with_noise) else {
         return Vec::new();
@@ -122,7 +123,7 @@ fn restarts(values: &[f64]) -> Vec<Range<usize>> {
             at += 1;
             continue;
         }
-        // The recursion reaches back over the restart for so many samples.
+        // The recursion spans the restart for this many samples.
         let near = at..(at + 2 * ORDER).min(left.len());
         let last = near.rev().find(|i| left[*i] > least.max(JUMP * before));
         let end = last.unwrap_or(at) + 1;
@@ -133,8 +134,8 @@ fn restarts(values: &[f64]) -> Vec<Range<usize>> {
     found
 }
 
-/// Size of what the recursion, fitted from a sample on, leaves at each sample, from the first that it predicts on; `None` if there
-/// are too few.
+/// Magnitude of the prediction error of the recursion, fitted from a sample on, at each sample from the first predicted
+/// one; `None` if there are too few.
 fn unpredicted(values: &[f64], fitted_from: usize) -> Option<Vec<f64>> {
     let rows = values.len().checked_sub(fitted_from + ORDER)?;
     if rows < 4 * ORDER {
@@ -155,11 +156,11 @@ fn unpredicted(values: &[f64], fitted_from: usize) -> Option<Vec<f64>> {
     Some(none.chain(left).collect())
 }
 
-/// The normal equations of the recursion, without its rows: what a product of two lags sums to differs from that of the lags
+/// Normal equations of the recursion, without forming its rows: a lagged product sum differs from that with both lags
 /// one less by its first and last term.
 fn equations(values: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
     let rows = values.len() - ORDER;
-    // Column k of the rows, the sample so many before the predicted one; the last is 1. Lag 0 is the right side.
+    // Column k of the rows, k samples before the predicted one; the last is 1. Lag 0 is the right-hand side.
     let at = |lag: usize| &values[ORDER - lag..][..rows];
     let mut products = DMatrix::zeros(ORDER + 1, ORDER + 1);
     for lag in 0..=ORDER {
@@ -193,7 +194,7 @@ fn equations(values: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
 mod tests {
     use super::*;
 
-    /// Decays of a stand, by their formula, each from a sample on with its amplitude.
+    /// Closed-form decays of a stand, each from a sample on with its amplitude.
     fn decays(hits: &[(usize, f64)], noise: f64, count: usize) -> Vec<f64> {
         let mut state = 1_u64;
         let one = |i: usize| {
@@ -224,7 +225,7 @@ mod tests {
             let two = decays(&[(0, 1.0), (at, size)], 1e-3, 3000);
             let found = parts(&two, 40);
             assert_eq!(found.len(), 2, "at {at}: {found:?}");
-            // Its sine is still zero at the hit.
+            // The sine is still zero at the hit.
             assert!(found[0].end.abs_diff(at) < 3, "{found:?}");
             assert!((at..at + 40).contains(&found[1].start), "{found:?}");
         }

@@ -1,4 +1,4 @@
-//! Which modes a decay has, found one by one.
+//! Stepwise search for the modes of a decay.
 
 use torqcomp_dsp::peaks::Peak;
 use torqcomp_model::fit::FitError;
@@ -8,10 +8,10 @@ use super::modes::{ModesFit, Stretch, linear_part};
 use crate::identify::Pole;
 use crate::identify::hum::SteadyLine;
 
-/// Which modes are searched for.
+/// Options of the search for modes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ModeSearch {
-    /// Their number, if it is known.
+    /// Number of modes, if known.
     pub count: Option<usize>,
     /// Maximum number otherwise.
     pub most: usize,
@@ -19,30 +19,31 @@ pub(super) struct ModeSearch {
     pub band_hz: (f64, f64),
 }
 
-/// Relative distance in frequency below which two lines are one mode, unless the number of modes is given: a frequency
+/// Relative frequency difference below which two lines are one mode, unless the number of modes is given: a frequency
 /// or damping that changes with amplitude or time looks the same.
 const CLOSE: f64 = 0.03;
 
-/// Power of what is left, over that of the decay, below which no more modes are searched for: 110 dB, more than a
-/// recorder resolves. What is left of computed decays is the rounding of their digits, which decays with them.
+/// Power of the residual, relative to that of the decay, below which the search ends: 110 dB, beyond the
+/// resolution of a recorder. The residual of computed decays is rounding error of their digits, which decays with
+/// them.
 pub(super) const RESOLVED: f64 = 1e-11;
 
-/// Harmonics of the mains among which a steady line is looked for.
+/// Number of mains harmonics searched for a steady line.
 const HARMONICS: f64 = 10.0;
-/// How far the mains may be off 50 or 60 Hz.
+/// Tolerance of the mains frequency about 50 or 60 Hz.
 const OFF_HZ: f64 = 0.3;
-/// Part of its amplitude, as an exponent, that a steady line may seem to lose over a record.
+/// Decay exponent over a record up to which a line counts as steady.
 const STEADY: f64 = 0.3;
 
-/// What is left of a line that was taken off: so many turns from it over the stretch, and so much of its amplitude.
+/// Remainder of a removed line: distance in cycles over the segment, and relative amplitude.
 const LEFT_NEAR: f64 = 2.0;
 const LEFT_SHARE: f64 = 0.3;
 
 /// Standard uncertainties by which the decay rate of a steady line may differ from zero.
 const STEADY_STD: f64 = 3.0;
 
-/// Searches for the modes. Steady lines of the mains are no modes, and other steady lines neither, if something decays beside
-/// them: a stand that hardly decays while it is recorded is one, too.
+/// Searches for the modes. Steady mains lines are not modes, nor are other steady lines if something else decays: a
+/// stand that hardly decays during the record is a mode, too.
 ///
 /// # Errors
 /// [`FitError`] if there are too few samples. Without a significant mode the fit is empty.
@@ -65,11 +66,12 @@ pub(super) fn search<'a>(
     Ok(other)
 }
 
-/// Standard uncertainties by which the rates of what decays beside a steady line must differ from zero, and the turns that it
-/// must swing: a stand that rings for longer than it is recorded looks steady too, and a drift beside it is no mode.
+/// Minimum distance of the decay rates of other modes from zero, in standard uncertainties, and minimum number of their
+/// cycles, for a line to count as steady: a stand that rings for longer than the record looks steady too, and a drift
+/// next to it is not a mode.
 const CLEARLY: (f64, f64) = (5.0, 5.0);
 
-/// Whether there are modes, and all of them decay and swing without doubt.
+/// Whether there are modes, all with significant decay and oscillation.
 fn decays_clearly(found: &ModesFit, stretches: &[Stretch]) -> bool {
     let length = length_s(stretches);
     let one = |(k, pole): (usize, &Pole)| {
@@ -79,7 +81,7 @@ fn decays_clearly(found: &ModesFit, stretches: &[Stretch]) -> bool {
     !found.poles.is_empty() && found.poles.iter().enumerate().all(one)
 }
 
-/// Amplitude of a mode in the stretch where it is largest.
+/// Amplitude of a mode in the segment where it is largest.
 pub(super) fn largest(found: &ModesFit, mode: usize, stretches: &[Stretch]) -> f64 {
     let amplitudes = (0..stretches.len()).map(|s| found.amplitude(mode, s));
     amplitudes.fold(0.0, f64::max)
@@ -98,7 +100,7 @@ pub(super) fn steady(found: &ModesFit, place: usize, stretches: &[Stretch]) -> O
             && std_hz.is_some_and(|std| std < OFF_HZ * harmonic)
     };
     let is_of_mains = [50.0, 60.0].into_iter().any(of_grid);
-    // Without an uncertainty the rate lies at its bound, zero.
+    // Without an uncertainty the rate is at its bound, zero.
     let is_any = std(0).is_none_or(|std| pole.rate_per_s < STEADY_STD * std);
     let is_steady = pole.rate_per_s * length_s(stretches) < STEADY;
     (is_steady && (is_of_mains || is_any)).then(|| SteadyLine {
@@ -108,8 +110,8 @@ pub(super) fn steady(found: &ModesFit, place: usize, stretches: &[Stretch]) -> O
     })
 }
 
-/// Whether a mode of a fit is what is left of a line that was taken off before: near it and much smaller. One that was fitted
-/// before the decay beside it is not taken off whole.
+/// Whether a mode of a fit is the remainder of a line removed before: near it and much smaller. A line fitted before
+/// the decay next to it is not removed completely.
 pub(super) fn is_left_of<'l>(
     mut lines: impl Iterator<Item = &'l SteadyLine>,
     found: &ModesFit,
@@ -125,7 +127,7 @@ pub(super) fn is_left_of<'l>(
     })
 }
 
-/// Takes a mode of a fit off the stretches.
+/// Removes a mode of a fit from the segments.
 pub(super) fn take_off(stretches: &mut [Stretch], found: &ModesFit, mode: usize) {
     for s in 0..stretches.len() {
         let line = found.part(stretches, mode, s);
@@ -134,7 +136,7 @@ pub(super) fn take_off(stretches: &mut [Stretch], found: &ModesFit, mode: usize)
     }
 }
 
-/// Length of the longest stretch.
+/// Duration of the longest segment.
 fn length_s(stretches: &[Stretch]) -> f64 {
     let ends = stretches.iter().filter_map(|s| s.times_s.last());
     ends.fold(0.0_f64, |m, t| m.max(*t))
@@ -143,9 +145,9 @@ fn length_s(stretches: &[Stretch]) -> f64 {
 /// Minimum gain for one more mode.
 pub(super) const LEAST_GAIN: f64 = 20.0;
 
-/// Gain of one more mode, the last of `after`: the reduction of the sum of squares over the power of the noise at the
-/// mode's frequency, less ln n for each parameter (Bayesian information criterion, where that power is known). Noise that
-/// is strongest at the frequency of the first mode counts with its mean power: a stand that rings has a mode.
+/// Gain of one more mode, the last of `after`: the reduction of the sum of squares relative to the noise power at the
+/// mode's frequency, minus ln n for each parameter (Bayesian information criterion for known noise power). Noise that
+/// peaks at the frequency of the first mode counts with its mean power: a stand that rings has a mode.
 pub(super) fn gain(before: &ModesFit, after: &ModesFit, stretches: &[Stretch]) -> f64 {
     let Some(pole) = after.poles.last() else {
         return 0.0;
@@ -165,7 +167,7 @@ pub(super) fn gain(before: &ModesFit, after: &ModesFit, stretches: &[Stretch]) -
     (0..stretches.len()).map(of_stretch).sum::<f64>() - more * n.ln()
 }
 
-/// Frequency in Hz of a mode that is too close to the last one, if there is one.
+/// Frequency in Hz of a mode that is too close to the last one, if any.
 pub(super) fn close(poles: &[Pole]) -> Option<f64> {
     let last = poles.last()?;
     let near = |p: &&Pole| (p.omega_rad_per_s / last.omega_rad_per_s - 1.0).abs() < CLOSE;
@@ -174,10 +176,11 @@ pub(super) fn close(poles: &[Pole]) -> Option<f64> {
 }
 
 /// Standard uncertainties by which the decay rate of the first mode and of any other one must differ from zero. A stand
-/// that rings has a mode, even if the record is too short to say much of its damping.
+/// that rings has a mode, even if the record is too short to determine its damping.
 const DECAYS: [f64; 2] = [1.0, 2.0];
 
-/// Whether every mode but the tones decays significantly, swings more than once, and differs from the others.
+/// Whether every mode except the tones decays significantly, has more than one cycle, and differs from the
+/// others.
 pub(super) fn physical(found: &ModesFit, stretches: &[Stretch], tones: &[usize]) -> bool {
     let length = length_s(stretches);
     let one = |(k, pole): (usize, &Pole)| {
@@ -198,7 +201,7 @@ pub(super) fn physical(found: &ModesFit, stretches: &[Stretch], tones: &[usize])
     found.poles.iter().enumerate().all(one)
 }
 
-/// A start for one more mode.
+/// Start values for one more mode.
 pub(super) fn next_pole(
     stretches: &[Stretch],
     so_far: &ModesFit,
@@ -215,7 +218,7 @@ pub(super) fn next_pole(
     let (lowest, highest) = (band_hz.0.max(1.5 / length), band_hz.1);
     let within = |from, to| stretch.strongest(&uniform, from..to);
     let peak = within(lowest, highest)?;
-    // Coloured noise can have a stronger line than a mode that rings for a short time.
+    // Coloured noise can have a stronger line than a short-lived mode.
     let below = within(lowest, peak.frequency_hz / APART);
     let above = within(peak.frequency_hz * APART, highest);
     let rest = Stretch::new(&stretch.times_s, left);
@@ -229,10 +232,10 @@ pub(super) fn next_pole(
     best.map(|(_, pole)| pole)
 }
 
-/// Ratio of the frequencies of lines that are tried beside the strongest.
+/// Frequency ratio of lines tried in addition to the strongest.
 const APART: f64 = 1.5;
 
-/// Poles that a line could be.
+/// Candidate poles of a line.
 fn starts_at(peak: Peak) -> impl Iterator<Item = Pole> {
     let omega = std::f64::consts::TAU * peak.frequency_hz;
     let wide = std::f64::consts::PI * peak.width_hz;
@@ -244,7 +247,7 @@ fn starts_at(peak: Peak) -> impl Iterator<Item = Pole> {
     })
 }
 
-/// Values interpolated linearly at equal steps; good enough for a start.
+/// Linear interpolation at equal steps, sufficient for start values.
 fn on_grid(times_s: &[f64], values: &[f64], rate_hz: f64) -> Vec<f64> {
     let mut out = Vec::with_capacity(values.len());
     let mut k = 0;

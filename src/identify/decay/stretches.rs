@@ -1,4 +1,4 @@
-//! Records cut into stretches of free ringing, decimated where they have more samples than needed.
+//! Splitting of records into segments of free decay, decimated if oversampled.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -17,31 +17,31 @@ use crate::identify::Identification;
 use crate::identify::hum::{SteadyLine, without_mains};
 use crate::print::short;
 
-/// Most samples that are fitted, of all stretches together.
+/// Maximum number of fitted samples, over all segments.
 const MOST_SAMPLES: usize = 20_000;
 
-/// Samples left by decimation above which the stretches are undersampled.
+/// Number of samples after decimation above which the segments are undersampled.
 const MANY_SAMPLES: usize = 65_536;
-/// Lengths of the filter, to either side, that a stretch to be undersampled must have …
+/// Minimum length of a segment to be undersampled, in filter half-lengths …
 const LEAST_LENGTHS: usize = 16;
-/// … and the samples over which the line that rings for the shortest time is seen: what lies before the middle of the filter is
-/// not fitted.
+/// … and minimum number of samples over which the shortest-lived line is visible: samples before the middle of the
+/// filter are lost.
 const LEAST_RINGING: usize = 32;
-/// Filters that are tried: half-length in samples of the result, and part of its frequency that is kept beside a line. Longer
-/// filters have narrower edges, so that more bands find room at a lower rate.
+/// Filters tried: half-length in samples of the result, and relative bandwidth kept around a line. Longer filters have
+/// narrower edges, so that more bands fit at a lower rate.
 const FILTERS: [(usize, f64); 4] = [(32, 0.01), (32, 0.003), (128, 0.01), (128, 0.003)];
 
-/// Most stretches that are used.
+/// Maximum number of segments used.
 const MOST_STRETCHES: usize = 12;
 
-/// Power of the weakest line that decimation must keep, over that of the strongest.
+/// Power of the weakest line that decimation must keep, relative to the strongest.
 const WORTH: f64 = 1e-6;
 
-/// Fewest samples of a record.
+/// Minimum number of samples in a record.
 const LEAST_SAMPLES: usize = 40;
 
-/// Cuts all records into stretches of free ringing and decimates them where nothing is lost; with the lines of the mains that
-/// were taken off.
+/// Splits all records into segments of free decay and decimates them without loss; also returns the removed mains
+/// lines.
 pub(super) fn stretches(
     records: &[Ringing],
     options: &DecayOptions,
@@ -89,8 +89,8 @@ pub(super) fn stretches(
     Ok((all, lines))
 }
 
-/// How to keep fewer samples than decimation leaves, if these are too many; and the rate of the stretches. `None` if they lie
-/// at several rates or ring in bands that are too wide for that.
+/// Undersampling where decimation leaves too many samples, and the rate of the segments. `None` for segments of several
+/// rates or too wide bands.
 fn undersampling(cut: &[Cutout], factors: &[usize]) -> Option<(Undersampling, f64)> {
     let rate_hz = cut.first()?.rate_hz?;
     let lengths = cut.iter().map(|part| part.values.len());
@@ -127,7 +127,7 @@ fn undersampling(cut: &[Cutout], factors: &[usize]) -> Option<(Undersampling, f6
     Some((best?, rate_hz))
 }
 
-/// A record, low-passed and decimated if a band is given.
+/// A record, low-pass filtered and decimated if a band is given.
 struct Prepared<'a> {
     times_s: Cow<'a, [f64]>,
     values: Cow<'a, [f64]>,
@@ -135,7 +135,7 @@ struct Prepared<'a> {
     rate_hz: Option<f64>,
 }
 
-/// A stretch of it.
+/// A segment of it.
 struct Cutout<'a> {
     times_s: &'a [f64],
     values: &'a [f64],
@@ -153,7 +153,7 @@ impl Prepared<'_> {
 }
 
 impl Cutout<'_> {
-    /// One sample in `factor`.
+    /// Every `factor`-th sample.
     fn decimated(&self, factor: usize) -> Result<Stretch, Failure> {
         let few = decimate::decimate(self.values, factor)?;
         let kept = self.times_s[few.first..].iter().step_by(factor).copied();
@@ -161,7 +161,7 @@ impl Cutout<'_> {
         Ok(Stretch::new(&kept, few.samples))
     }
 
-    /// Fewer samples than two in a period.
+    /// Undersampled: fewer than two samples per period.
     fn undersampled(&self, few: &Undersampling, rate_hz: f64) -> Result<Stretch, Failure> {
         let kept = few.apply(self.values)?;
         let time_s = |k: usize| (k * few.factor) as f64 / rate_hz;
@@ -177,10 +177,10 @@ impl Cutout<'_> {
     }
 }
 
-/// The records, and the stretches of free ringing in them, each with the place of its record.
+/// The records, and the segments of free decay in them, each with the index of its record.
 type Cut<'a> = (Vec<Prepared<'a>>, Vec<(usize, Range<usize>)>);
 
-/// Cuts all records.
+/// Splits all records.
 fn cut<'a>(
     records: &[Ringing<'a>],
     options: &DecayOptions,
@@ -204,22 +204,22 @@ fn cut<'a>(
     Ok((all, cuts.stretches))
 }
 
-/// The stretches that are fitted, and what is left out of the decays.
+/// The fitted segments, and what is excluded from the decays.
 #[derive(Default)]
 struct Cuts {
-    /// With the place of their record.
+    /// With the index of their record.
     stretches: Vec<(usize, Range<usize>)>,
     found: usize,
-    /// Samples of noise behind the ringing.
+    /// Number of samples of noise after the decay.
     left_out: usize,
-    /// Samples up to the last clipped one.
+    /// Number of samples up to the last clipped one.
     left_clipped: usize,
-    /// Times at which a decay starts again.
+    /// Times at which a decay restarts.
     restarts_s: Vec<f64>,
 }
 
 impl Cuts {
-    /// Adds the stretches of a decay; `clipped_s` are the times of the clipped samples of its record.
+    /// Adds the segments of a decay; `clipped_s` are the times of the clipped samples of its record.
     fn add(&mut self, record: &Prepared, range: Range<usize>, (clipped_s, place): (&[f64], usize)) {
         let (times, values) = (&record.times_s, &record.values);
         let clipped = clipped_at_start(clipped_s, &times[range.clone()]);
@@ -242,7 +242,7 @@ impl Cuts {
         }
     }
 
-    /// Says what was left out.
+    /// Reports what was excluded.
     fn describe(&self, result: &mut Identification) -> Result<(), Failure> {
         let (left_clipped, left_out, found) = (self.left_clipped, self.left_out, self.found);
         result
@@ -279,11 +279,11 @@ impl Cuts {
     }
 }
 
-/// What a restart means where its parts are decays of their own.
+/// Consequence of a restart where its parts are separate decays.
 pub(super) const OWN_PARTS: &str = "the parts before and after that are fitted as decays of their own; hit once and take your hand off the \
                          stand";
 
-/// Times at which a decay of a record starts again.
+/// Times at which a decay of a record restarts.
 pub(super) fn restarts_s(record: &Ringing) -> Vec<f64> {
     let mut found = Vec::new();
     for range in onset::decays(record.values) {
@@ -295,11 +295,11 @@ pub(super) fn restarts_s(record: &Ringing) -> Vec<f64> {
     found
 }
 
-/// Steps of the recorder that a swing must have. Where it has fewer, it is not rounded as if by noise: what is below half a
-/// step reads as rest, which looks like friction.
+/// Minimum oscillation in steps of the recorder. Below it, rounding is no longer like noise: values below half a step
+/// read as rest, which looks like friction.
 const LEAST_STEPS: f64 = 2.0;
 
-/// The part of a decay up to where it swings over less than two steps of the recorder.
+/// The part of a decay before the oscillation falls below two steps of the recorder.
 fn above_steps(values: &[f64], range: Range<usize>, step: f64) -> Range<usize> {
     let mut sorted = values[range.clone()].to_vec();
     let middle = sorted.len() / 2;
@@ -312,7 +312,7 @@ fn above_steps(values: &[f64], range: Range<usize>, step: f64) -> Range<usize> {
     }
 }
 
-/// A stretch cut where it starts again, if its samples are uniform.
+/// A segment split at its restarts, if its samples are uniform.
 fn parts(values: &[f64], rings: &Range<usize>, is_uniform: bool) -> Vec<Range<usize>> {
     if !is_uniform {
         return std::iter::once(rings.clone()).collect();
@@ -322,7 +322,7 @@ fn parts(values: &[f64], rings: &Range<usize>, is_uniform: bool) -> Vec<Range<us
     parts.into_iter().map(within).collect()
 }
 
-/// Times of the samples that the recorder cut off, or an amplifier before it.
+/// Times of the samples clipped by the recorder, or an amplifier before it.
 fn clipped_times(record: &Ringing, result: &mut Identification) -> Vec<f64> {
     let of_amplifier = || {
         let found = flat_tops(record.values)?;
@@ -344,7 +344,7 @@ fn clipped_times(record: &Ringing, result: &mut Identification) -> Vec<f64> {
     clipped.map(|(time_s, _)| *time_s).collect()
 }
 
-/// Samples of a decay up to its last one that is cut off.
+/// Number of samples of a decay up to its last clipped one.
 fn clipped_at_start(clipped_s: &[f64], times_s: &[f64]) -> usize {
     let Some(end_s) = times_s.last() else {
         return 0;
@@ -353,7 +353,7 @@ fn clipped_at_start(clipped_s: &[f64], times_s: &[f64]) -> usize {
     last.map_or(0, |last| times_s.partition_point(|t| t <= last))
 }
 
-/// The part of a stretch that rings, of a long one with as much noise behind it.
+/// The ringing part of a segment; for a long one followed by an equal length of noise.
 fn ringing(values: &[f64], range: &Range<usize>, is_uniform: bool) -> Range<usize> {
     let kept = match range.len() > MOST_SAMPLES {
         true => onset::until_noise(&values[range.clone()]),
@@ -367,7 +367,7 @@ fn ringing(values: &[f64], range: &Range<usize>, is_uniform: bool) -> Range<usiz
     rings.start + lead..rings.end
 }
 
-/// Refuses a record that is too short or has holes.
+/// Rejects a record that is too short or has gaps.
 fn check(record: &Ringing) -> Result<(), Failure> {
     if let Some(i) = record.values.iter().position(|v| !v.is_finite()) {
         return Err(Failure::failed(
@@ -392,7 +392,7 @@ fn check(record: &Ringing) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A record with these values, low-passed and decimated if a band is given.
+/// A record with these values, low-pass filtered and decimated if a band is given.
 fn prepared<'a>(
     record: &Ringing<'a>,
     values: Cow<'a, [f64]>,
@@ -429,7 +429,7 @@ fn band_factor(rate_hz: f64, highest_hz: f64) -> usize {
     ((decimate::PASS * rate_hz / highest_hz).floor() as usize).max(1)
 }
 
-/// Decimation factor that the highest significant line allows, for records with many samples.
+/// Decimation factor permitted by the highest significant line, for records with many samples.
 fn factor(values: &[f64], rate_hz: f64, enough: usize) -> usize {
     if values.len() <= enough.max(1000) {
         return 1;

@@ -1,19 +1,20 @@
-//! Decaying turns `e^{(−σ+jω)t}` at many moments.
+//! Decaying phasors `e^{(−σ+jω)t}` at many moments.
 
 use num_complex::Complex64;
 
 use crate::identify::Pole;
 
-/// Times from which on uniform ones are recognised; the other way costs a sine, a cosine and an exponential each.
+/// Minimum number of times for detecting a uniform grid; otherwise each costs a sine, a cosine and an
+/// exponential.
 const MANY: usize = 32_768;
-/// Turns that are multiplied on from one to the next, before rounding adds up.
+/// Number of successive multiplications of a phasor before rounding errors accumulate.
 const BLOCK: usize = 64;
-/// Error of a turn, beside that of the rounding of its time, for which times count as uniform.
+/// Error of a phasor, in addition to the rounding of its time, up to which times count as uniform.
 const SAME: f64 = 1e-11;
-/// Error of a time by rounding, over it, when it is compared with a grid.
+/// Relative rounding error of a time for the comparison with a grid.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// Calls a function with the place of each moment and the turn there.
+/// Calls a function with the index of each moment and the phasor there.
 pub(super) fn turns(times_s: &[f64], pole: Pole, mut each: impl FnMut(usize, Complex64)) {
     let exponent = Complex64::new(-pole.rate_per_s, pole.omega_rad_per_s);
     let at = |time_s: f64| {
@@ -51,7 +52,7 @@ mod tests {
             omega_rad_per_s: 4000.0,
         };
         let uniform = |i: usize| i as f64 / 5000.0;
-        // A stamp of every thousand is late.
+        // Every thousandth stamp is late.
         let uneven = |i: usize| uniform(i) + if i % 1000 == 7 { 1e-5 } else { 0.0 };
         for time_s in [&uniform as &dyn Fn(usize) -> f64, &uneven] {
             let times: Vec<f64> = (0..MANY + 100).map(time_s).collect();

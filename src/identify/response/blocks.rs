@@ -1,4 +1,4 @@
-//! Records cut into blocks: hits, segments of noise, or periods.
+//! Splitting of records into blocks: hits, segments of noise, or periods.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -12,7 +12,7 @@ use crate::identify::hum::{self, without_mains};
 use crate::identify::{Identification, rms};
 use crate::print::{plural, rounded, short};
 
-/// Blocks of all records, on one grid of frequencies.
+/// Blocks of all records, on a common frequency grid.
 pub(super) struct Set {
     pub blocks: Vec<Block>,
     /// Powers summed over all blocks.
@@ -23,7 +23,7 @@ pub(super) struct Set {
     /// Decay rate in 1/s that the window adds to every mode.
     pub added_rate: f64,
     pub window: Window,
-    /// Whether the spectra are those of differences from sample to sample, over what a difference does to a spectrum.
+    /// Whether the spectra are those of sample differences, divided by the response of the difference.
     pub of_differences: bool,
 }
 
@@ -41,23 +41,23 @@ impl Set {
         }
     }
 
-    /// Mean relative error of a response, given at the lines, over all blocks.
+    /// Mean relative error over all blocks of a response given at the lines.
     pub fn error(&self, response: &[Complex64], lines: &Range<usize>) -> f64 {
         let error = |block| frf::prediction_error(response, block, lines.clone());
         self.blocks.iter().map(error).sum::<f64>() / self.blocks.len() as f64
     }
 }
 
-/// Part of the samples at rest from which the excitation is a hammer.
+/// Fraction of the samples at rest above which the excitation is a hammer.
 const AT_REST: f64 = 0.95;
 
-/// Swing at the end of a hit, over the largest, from which a window is needed.
+/// Amplitude at the end of a hit, relative to the largest, above which a window is needed.
 const RINGING: f64 = 5e-3;
 
 /// Value of the window at the end.
 const WINDOW_END: f64 = 1e-2;
 
-/// Cuts all records.
+/// Splits all records.
 pub(super) fn blocks(
     records: &[Driven],
     options: &ResponseOptions,
@@ -89,9 +89,11 @@ fn guess(applied: &[f64]) -> Excitation {
     }
 }
 
-/// Part of a record, at either end, over which levels are taken.
+/// Divisor of the record length that gives the length at either end over which levels are
+/// estimated.
 const END: usize = 10;
-/// Spread of a signal within either end, over the difference of their levels, below which it is a step.
+/// Spread of a signal within either end, relative to the difference of their levels, below which it is
+/// a step.
 const STEADY: f64 = 0.1;
 
 /// Whether a signal goes from one steady level to another.
@@ -114,7 +116,7 @@ fn mean(samples: &[f64]) -> f64 {
     samples.iter().sum::<f64>() / samples.len() as f64
 }
 
-/// Applied and measured signal of each record without the lines of the mains, which are no answer to a transient.
+/// Applied and measured signal of each record without mains lines, which are not a response to a transient.
 struct Clean<'a>(Vec<[Cow<'a, [f64]>; 2]>);
 
 impl<'a> Clean<'a> {
@@ -150,7 +152,7 @@ struct Transient {
 }
 
 fn impacts(recorded: &[Driven], result: &mut Identification) -> Result<Set, Failure> {
-    // Hum hides that a limit is flat.
+    // Hum hides the flat top of clipping.
     let good = good_hits(recorded, result)?;
     let clean = Clean::of(recorded, result);
     let records = &clean.records(recorded);
@@ -184,8 +186,8 @@ fn without_offset(signal: &[f64]) -> Vec<f64> {
     signal.iter().map(|v| v - level).collect()
 }
 
-/// The force of a hit; where nothing but noise is beside it, none is there. Beside it, the part by which the response is too
-/// small by noise that could not be taken off.
+/// The force of a hit, set to zero outside the hit if there is only noise. Also the relative bias of the response due
+/// to noise that could not be removed.
 fn force_of_hit(signal: &[f64]) -> (Vec<f64>, f64) {
     let Some(stroke) = frf::stroke_of(signal) else {
         return (without_offset(signal), frf::noise_share(signal));
@@ -197,8 +199,8 @@ fn force_of_hit(signal: &[f64]) -> (Vec<f64>, f64) {
     (force, 0.0)
 }
 
-/// Every record as one transient, whatever its shape. The spectra are those of the differences from sample to sample over
-/// 1 − e^(−jω), as levels may differ between start and end.
+/// Every record as one transient, whatever its shape. The spectra are those of sample differences over 1 − e^(−jω), as
+/// the levels at start and end may differ.
 fn whole_transients(recorded: &[Driven], result: &mut Identification) -> Set {
     let clean = Clean::of(recorded, result);
     let records = &clean.records(recorded);
@@ -319,13 +321,13 @@ fn second_stroke(record: &Driven, k: usize, part: f64) -> String {
     )
 }
 
-/// Whether a response still rings at its end.
+/// Whether a response is still ringing at its end.
 fn still_rings(measured: &[f64]) -> bool {
     let top = measured.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     rms(&measured[measured.len() - measured.len() / 20..]) > RINGING * top
 }
 
-/// An exponential window, if a response still rings at the end.
+/// An exponential window, if a response is still ringing at the end.
 fn window_for(still_rings: bool, length: usize) -> Window {
     match still_rings {
         true => Window::Exponential(length as f64 / -WINDOW_END.ln()),
@@ -396,7 +398,7 @@ fn periodic(
             frf::transform(applied, &record.measured[samples], Window::None)
         };
         let mut cut: Vec<Block> = (0..record.applied.len() / period).map(block).collect();
-        // The first period still shows the transient.
+        // The first period still contains the transient.
         if cut.len() > 2 {
             cut.remove(0);
         }
@@ -417,7 +419,7 @@ fn periodic(
     Ok(Set::new(all, rate_hz / period as f64, Window::None))
 }
 
-/// Says how large noise and distortion are.
+/// Reports the level of noise and distortion.
 fn report_noise(result: &mut Identification, name: &str, found: &frf::Periodic) {
     let lines = found.excited.len();
     let sum = |keep: &dyn Fn(usize) -> bool, of: &dyn Fn(usize) -> f64| -> f64 {

@@ -1,4 +1,4 @@
-//! Refusal of records that show no response, and signs of swapped channels and poor fits.
+//! Rejection of records that show no response, and signs of swapped channels and poor fits.
 
 use super::Driven;
 use super::blocks::Set;
@@ -9,7 +9,7 @@ use crate::identify::Identification;
 use crate::print::{plural, rounded, short};
 use torqcomp_dsp::frf::{Estimator, Window};
 
-/// Refuses records that differ in rate, have gaps, or do not change.
+/// Rejects records that differ in rate, have gaps, or are constant.
 pub(super) fn records(records: &[Driven]) -> Result<(), Failure> {
     let first = records
         .first()
@@ -57,13 +57,13 @@ pub(super) fn records(records: &[Driven]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Part of the lines with leading phase from which the response leads.
+/// Fraction of the lines with leading phase above which the response leads.
 const LEADING: f64 = 0.9;
-/// Imaginary part over the magnitude below which a line neither leads nor lags.
+/// Ratio of imaginary part to magnitude below which a line neither leads nor lags.
 const IN_PHASE: f64 = 0.02;
 
-/// Whether the measured signal leads at nearly all lines. Where one point is driven and measured it lags: the imaginary
-/// part of ω^−m j^−m H is negative. Otherwise the channels are swapped or one has the wrong sign.
+/// Whether the measured signal leads at nearly all lines. A driving-point response lags: the imaginary part of ω^−m
+/// j^−m H is negative. Otherwise the channels are swapped or one has the wrong sign.
 pub(super) fn leads(set: &Set, lines: &Lines, order: i32) -> bool {
     let h1 = set.powers.response(Estimator::H1);
     let turn = num_complex::Complex64::I.powi(-order);
@@ -88,12 +88,12 @@ pub(super) fn is_out_of_reach(set: &Set, fitted: &Modal) -> bool {
     poles.any(|pole| pole.rate_per_s.hypot(pole.omega_rad_per_s) > highest)
 }
 
-/// Relative widening of a resonance by Hann's window from which there is a warning.
+/// Minimum reported relative broadening of a resonance by the Hann window.
 const WIDER: f64 = 0.01;
 
-/// Warns where Hann's window widens a resonance. Smoothing by the squared window multiplies the decay by its
-/// autocorrelation, 1 − (2πt/L)²/6 for short times; over a decay time 1/σ the damping grows by about twice that,
-/// `(2π/σL)²/3`.
+/// Warns if the Hann window broadens a resonance. Smoothing by the squared window multiplies the decay by its
+/// autocorrelation, 1 − (2πt/L)²/6 for short times; over a time constant 1/σ the damping grows by about twice
+/// that, `(2π/σL)²/3`.
 pub(super) fn leakage(result: &mut Identification, set: &Set, fitted: &Modal) {
     if set.window != Window::Hann {
         return;
@@ -116,10 +116,10 @@ pub(super) fn leakage(result: &mut Identification, set: &Set, fitted: &Modal) {
     }
 }
 
-/// Residual over the measured signal above which the fit is poor.
+/// Residual relative to the measured signal above which the fit is poor.
 const POOR: f64 = 0.3;
 
-/// Warns about what makes the fit doubtful.
+/// Warns about reasons to doubt the fit.
 pub(super) fn doubts(result: &mut Identification, found: &FinalFit, leads: bool) {
     if leads {
         result.warn("leads", LEADS);
@@ -138,14 +138,15 @@ pub(super) fn doubts(result: &mut Identification, found: &FinalFit, leads: bool)
     noise_before_resonance(result, found.gain_error);
 }
 
-/// Part of the force near half the rate, over that at rest, from which there is a warning.
+/// Minimum reported spectrum of the force near the Nyquist frequency, relative to DC.
 const FOLDED: f64 = 0.01;
-/// Error of the gain over that part. Spectra of pulses fall with the square of the frequency at least, and at half the rate
-/// twice the level is seen: a quarter of it comes down from both sides of the rate to rest, a third of what is left of sharp
-/// edges.
+/// Resulting error of the gain, as a fraction of that. Spectra of pulses fall at least with the square of the
+/// frequency, and at the Nyquist frequency twice the level is seen: a quarter of it aliases from both sides of the
+/// sampling rate to DC, a third of the remainder of sharp edges.
 const OF_GAIN: f64 = 1.0 / 3.0;
 
-/// Warns where pulses are so short that frequencies above half the rate fold into their spectrum.
+/// Warns about pulses so short that frequencies above the Nyquist frequency alias into their
+/// spectrum.
 pub(super) fn short_pulses(result: &mut Identification, part: f64) {
     if part > FOLDED {
         result.warn(
@@ -160,10 +161,10 @@ pub(super) fn short_pulses(result: &mut Identification, part: f64) {
     }
 }
 
-/// Largest error of the gain by noise in the applied signal from which there is a warning.
+/// Minimum reported error of the gain due to noise in the applied signal.
 const GAIN_ERROR: f64 = 1e-3;
 
-/// Warns of noise on the force of hits that could not be told from what else follows the stroke.
+/// Warns about noise on the force of hits that could not be separated from what follows the stroke.
 pub(super) fn noise_on_force(result: &mut Identification, part: f64) {
     if part > GAIN_ERROR {
         result.warn(
@@ -178,7 +179,7 @@ pub(super) fn noise_on_force(result: &mut Identification, part: f64) {
     }
 }
 
-/// Warns where noise enters before the resonance.
+/// Warns about noise that enters before the resonance.
 fn noise_before_resonance(result: &mut Identification, gain_error: f64) {
     if gain_error > GAIN_ERROR {
         result.warn(

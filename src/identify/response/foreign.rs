@@ -1,9 +1,9 @@
-//! Modes of a fit that are none of the stand: of drift, of AC coupling, of steady tones, or beyond all frequencies of the
-//! records.
+//! Fitted modes that do not belong to the stand: from drift, AC coupling or steady tones, or outside the frequency
+//! range of the records.
 //!
-//! A record that is coupled through a high-pass s/(s + a) has the response H(s) − H(s) a/(s + a): that of the stand, and one
-//! more pole far below. A drift beside a hit looks the same. Such a pole is needed in the fit, and has no part in what the
-//! stand does at rest.
+//! A record AC-coupled through a high-pass s/(s + a) has the response H(s) − H(s) a/(s + a): that of the stand, and one
+//! more pole far below. Drift next to a hit looks the same. Such a pole is needed in the fit, but does not belong to
+//! the static response of the stand.
 
 use std::f64::consts::TAU;
 
@@ -15,24 +15,24 @@ use crate::failure::{ErrorCode, Failure};
 use crate::identify::{Identification, Pole};
 use crate::print::rounded;
 
-/// Damping ratio from which a mode far below the others does not ring.
+/// Damping ratio above which a mode far below the others does not ring.
 const RINGS: f64 = 0.3;
-/// Natural frequency of such a mode, over that of the strongest, below which it is coupling or drift.
+/// Natural frequency of such a mode, relative to the strongest, below which it is coupling or drift.
 const FAR_BELOW: f64 = 0.1;
-/// Lines of a block up to which it is.
+/// Number of lines of a block up to which a mode counts as such.
 const SLOW: f64 = 10.0;
-/// Standard uncertainties by which a mode's decay rate must differ from zero, and part of its amplitude, as an exponent, that
-/// it must lose within a block; one of both is enough.
+/// Minimum distance of a mode's decay rate from zero in standard uncertainties, and minimum decay exponent within a
+/// block; either is sufficient.
 const DECAYS: (f64, f64) = (2.0, 0.3);
 
-/// Why a mode is none of the stand.
+/// Reason why a mode does not belong to the stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Foreign {
-    /// Slower than a block shows, or much slower than the others without ringing.
+    /// Slower than a block resolves, or much slower than the others without ringing.
     Drift,
     /// Above all frequencies of the records.
     OutOfReach,
-    /// Without a damping that the records show.
+    /// Without identifiable damping.
     Steady,
 }
 
@@ -40,12 +40,12 @@ fn natural_hz(pole: &Pole) -> f64 {
     pole.rate_per_s.hypot(pole.omega_rad_per_s) / TAU
 }
 
-/// Whether a mode has no damping and is no drift.
+/// Whether a mode has no damping and is not drift.
 pub(super) fn is_undamped(pole: &Pole, set: &Set) -> bool {
     pole.rate_per_s == 0.0 && natural_hz(pole) >= set.step_hz
 }
 
-/// Marks the modes that are none of the stand, unless none is left.
+/// Marks the modes that do not belong to the stand, unless none would be left.
 pub(super) fn mark(modal: &mut Modal, covariance: &Covariance, set: &Set) {
     let found = kinds(modal, covariance, set);
     if found.contains(&None) {
@@ -86,15 +86,15 @@ fn kinds(modal: &Modal, covariance: &Covariance, set: &Set) -> Vec<Option<Foreig
     modal.poles.iter().enumerate().map(one).collect()
 }
 
-/// Whether the fit says what the stand does at rest: a mode out of reach may take any part of it.
+/// Whether the fit determines the static response: a mode out of reach may take any part of it.
 pub(super) fn has_rest(modal: &Modal) -> bool {
     !modal.foreign.contains(&Some(Foreign::OutOfReach))
 }
 
-/// Warns about the modes that were left out.
+/// Warns about the excluded modes.
 ///
 /// # Errors
-/// If a stand file is to be written and no mode has a damping.
+/// If a stand file is to be written and no mode is damped.
 pub(super) fn warn(
     result: &mut Identification,
     modal: &Modal,
@@ -152,6 +152,6 @@ pub(super) fn undamped(result: &mut Identification, frequencies_hz: &[String]) {
     }
 }
 
-/// Said where no mode is one of the stand.
+/// Note if no mode belongs to the stand.
 pub(super) const NONE: &str =
     "no mode has a damping that these records show; record for longer, or choose another --band";

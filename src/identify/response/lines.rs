@@ -1,4 +1,4 @@
-//! The lines of a response that are fitted, and their weights.
+//! Fitted lines of a response, and their weights.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,11 +12,11 @@ use crate::print::{plural, short};
 /// Lines of a band.
 pub(super) type Lines = std::ops::Range<usize>;
 
-/// Power of an excited line, over that of the strongest.
+/// Minimum power of an excited line, relative to the strongest.
 const EXCITES: f64 = 1e-3;
 
-/// The given band, or the excited lines. A step has most of its power at its lowest lines, whatever it excites: of transients, that
-/// of their differences counts, and as many lines as can be fitted.
+/// The given band, or the excited lines. A step has most of its power at the lowest lines, whatever it excites; so for
+/// transients the power of their differences counts, and at most as many lines as can be fitted.
 pub(super) fn band(set: &Set, options: &ResponseOptions) -> Result<Lines, Failure> {
     let lines = set.blocks[0].applied.len();
     let frf = set.powers.response(Estimator::H1);
@@ -57,10 +57,10 @@ pub(super) fn band(set: &Set, options: &ResponseOptions) -> Result<Lines, Failur
     Ok(range)
 }
 
-/// Most lines that are fitted.
+/// Maximum number of fitted lines.
 pub(super) const MOST_LINES: usize = 6000;
 
-/// Lines of the band that is suggested: fewer than are fitted, as its limits are rounded.
+/// Number of lines in the suggested band, less than the maximum because its limits are rounded.
 const SUGGESTED: usize = 5800;
 
 /// The band of [`SUGGESTED`] lines in which the measured signal has most power.
@@ -79,7 +79,7 @@ pub(super) fn strongest(set: &Set, lines: &Lines) -> (usize, usize) {
     (first, first + SUGGESTED)
 }
 
-/// H1, each line weighted with the root of its applied power.
+/// H1, with each line weighted by the square root of its applied power.
 pub(super) fn data(powers: &Powers, set: &Set, lines: &Lines, options: &ResponseOptions) -> Data {
     let frf = powers.response(Estimator::H1);
     let response = frf.response[lines.clone()].to_vec();

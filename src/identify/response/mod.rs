@@ -1,4 +1,4 @@
-//! Modes from a known input and a measured output.
+//! Modal identification from a known input and a measured output.
 
 mod blocks;
 mod check;
@@ -51,24 +51,24 @@ pub struct Driven<'a> {
     pub measured: &'a [f64],
 }
 
-/// How responses are evaluated.
+/// Options for the evaluation of responses.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ResponseOptions {
-    /// How the stand was excited, if known.
+    /// Type of excitation, if known.
     pub excitation: Option<Excitation>,
-    /// Frequencies to fit.
+    /// Frequency range of the fit.
     pub band_hz: Option<(f64, f64)>,
     /// Number of modes, if known.
     pub modes: Option<usize>,
-    /// Samples of a period, if known.
+    /// Period in samples, if known.
     pub period: Option<usize>,
-    /// Samples of a segment; chosen from the length of the records if not given.
+    /// Segment length in samples; chosen from the length of the records if not given.
     pub segment: Option<usize>,
-    /// Order of the derivative of displacement that was measured: 0, 1 or 2.
+    /// Order of the measured derivative of displacement: 0, 1 or 2.
     pub order: i32,
     /// Whether a delay is fitted.
     pub with_delay: bool,
-    /// Whether several modes are those of a stand on its spring, which does not move freely below them.
+    /// Whether several modes are those of a stand on its spring, without free motion below them.
     pub grounded: bool,
 }
 
@@ -147,22 +147,23 @@ pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identif
 /// The final model with its uncertainties.
 struct FinalFit {
     modal: Modal,
-    /// Covariance of σ and ω of each mode, the delay, and then the linear numbers as far as they are known.
+    /// Covariance of σ and ω of each mode, the delay, and then the linear parameters, as far as they are
+    /// known.
     covariance: Covariance,
-    /// Place of the first linear number in the covariance.
+    /// Index of the first linear parameter in the covariance.
     linear: usize,
     /// Whether the covariance has the residues of all modes.
     has_residues: bool,
-    /// Residual over the measured signal.
+    /// Residual relative to the measured signal.
     relative: f64,
-    /// Largest relative error of the gain by noise in the applied signal.
+    /// Largest relative error of the gain due to noise in the applied signal.
     gain_error: f64,
     /// Standard uncertainty of the static response.
     static_gain_std: Option<f64>,
 }
 
-/// Standard uncertainty of the static response by the covariance of poles, delay and, from `linear` on, all linear
-/// parameters.
+/// Standard uncertainty of the static response from the covariance of poles, delay and, from `linear` on, all
+/// linear parameters.
 fn static_gain_std(modal: &Modal, covariance: &Covariance, linear: usize) -> Option<f64> {
     let (of_poles, of_linear) = modal.slopes_at_rest();
     let mut slopes = vec![0.0; linear + of_linear.len()];
@@ -172,7 +173,7 @@ fn static_gain_std(modal: &Modal, covariance: &Covariance, linear: usize) -> Opt
 }
 
 impl FinalFit {
-    /// A mode; with its residue if it is the only one.
+    /// A mode, with its residue if it is the only one.
     fn mode(&self, k: usize) -> ModalPole {
         let pole = self.modal.poles[k];
         let select = |places: &[usize]| all_or_none(self.covariance.select(places), places.len());
@@ -190,8 +191,8 @@ impl FinalFit {
     }
 }
 
-/// The fit without modes that these records give no damping: noise and nonlinearity make them, and in a stand file they would
-/// ring on for ever.
+/// The fit without modes whose damping is not identifiable from these records: they are caused by noise and
+/// nonlinearity, and in a stand file they would ring forever.
 fn without_undamped(
     set: &Set,
     data: &Data,
@@ -221,7 +222,8 @@ fn without_undamped(
 const ONE_HIT: &str = "one hit does not show the error of its own force (noise, and what is folded), which decides the \
     uncertainties here: those of frequency and damping are upper limits, that of the static gain can be too small; take several hits";
 
-/// The final fit: of the whole records without a window where windows have leakage, or of the averaged response.
+/// The final fit: to whole records without a window if the window causes leakage, otherwise to the averaged
+/// response.
 fn final_fit(
     mut whole: Option<whole::Whole>,
     (set, lines): (&Set, &Lines),

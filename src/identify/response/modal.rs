@@ -1,12 +1,12 @@
-//! A rational function through a frequency response: modes, residual terms and a delay.
+//! Rational model of a frequency response: modes, residual terms and a delay.
 //!
 //! ```text
 //! H(s) = s^m [ Σ R_k/(s − p_k) + R_k*/(s − p_k*) + c_1 + c_2/s² ] e^{−sτ},   p_k = −σ_k + jω_k
 //! ```
 //!
-//! m is 0 for displacement, 1 for speed, 2 for acceleration; c_1 is the effect of modes above the band, c_2 of those below
-//! and of free motion. Residues and c are linear and follow from the poles, so only poles and delay are searched for
-//! (variable projection: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973), 413).
+//! m is 0 for displacement, 1 for speed, 2 for acceleration; c_1 represents modes above the band, c_2 those below and
+//! free motion. Residues and c are linear and follow from the poles, so only poles and delay are searched for (variable
+//! projection: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973), 413).
 
 use std::sync::Mutex;
 use torqcomp_dsp::sort_by_number;
@@ -33,14 +33,14 @@ pub(super) struct Data {
     pub added_rate: f64,
     /// Whether a delay is fitted.
     pub with_delay: bool,
-    /// Whether c₂ is fitted: a stand that rests on its spring moves nowhere freely.
+    /// Whether c₂ is fitted: a stand on its spring has no free motion.
     pub below: bool,
 }
 
 /// Precision of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Effort {
-    /// Enough to choose the number of modes.
+    /// Sufficient to choose the number of modes.
     Coarse,
     /// Full.
     Fine,
@@ -61,14 +61,14 @@ pub(super) struct Modal {
     pub fit: Option<Fit>,
     /// Model at each line.
     pub response: Vec<Complex64>,
-    /// Why a mode is none of the stand; `None` for those that are.
+    /// Why a mode does not belong to the stand; `None` if it does.
     pub foreign: Vec<Option<Foreign>>,
     scale: f64,
     order: i32,
 }
 
 impl Data {
-    /// Scale of frequencies in rad/s.
+    /// Frequency scale in rad/s.
     pub(super) fn scale(&self) -> f64 {
         self.omega[self.omega.len() / 2]
     }
@@ -83,7 +83,7 @@ impl Data {
         1 + usize::from(self.below)
     }
 
-    /// The columns at a frequency; `all` is overwritten.
+    /// The columns at a frequency, written to `all`.
     fn columns(&self, omega: f64, poles: &[Pole], delay_s: f64, all: &mut Vec<Complex64>) {
         let scale = self.scale();
         let (front, s) = self.front(omega, delay_s, scale);
@@ -99,7 +99,7 @@ impl Data {
         }
     }
 
-    /// The factor of the sum, and s.
+    /// The factor before the sum, and s.
     pub(super) fn front(&self, omega: f64, delay_s: f64, scale: f64) -> (Complex64, Complex64) {
         let s = Complex64::new(0.0, omega / scale);
         let late = match delay_s == 0.0 {
@@ -120,7 +120,8 @@ impl Data {
         (1.0 / (s - p), 1.0 / (s - p.conj()))
     }
 
-    /// Linear parameters for given poles, and weighted residuals, real and imaginary parts alternating.
+    /// Linear parameters for given poles, and weighted residuals with alternating real and imaginary
+    /// parts.
     fn solve(&self, poles: &[Pole], delay_s: f64) -> Result<linear::LinearFit, FitError> {
         let count = 2 * poles.len() + self.outside();
         let lines = self.omega.len();
@@ -149,7 +150,7 @@ impl Data {
         Ok(self.modal_of(poles, (delay_s, None), &linear))
     }
 
-    /// Fits from starts of the poles.
+    /// Fits from start values of the poles.
     ///
     /// # Errors
     /// [`FitError`] if there are too few lines.
@@ -210,7 +211,7 @@ impl Data {
         }
     }
 
-    /// Poles and delay with their starts and bounds.
+    /// Poles and delay with their start values and bounds.
     fn parameters(&self, starts: &[Pole]) -> Vec<Parameter> {
         let (low, high) = (self.omega[0], self.omega[self.omega.len() - 1]);
         let mut parameters = Vec::new();
@@ -229,8 +230,8 @@ impl Data {
         parameters
     }
 
-    /// Derivatives of the weighted model by poles and delay at a fit, then by the first `linear` linear parameters, real
-    /// and imaginary parts alternating, projected off the other linear parameters.
+    /// Derivatives of the weighted model at a fit with respect to poles and delay, then to the first `linear` linear
+    /// parameters, with alternating real and imaginary parts, projected off the other linear parameters.
     ///
     /// # Errors
     /// [`FitError`] if there are too few lines.
@@ -246,8 +247,8 @@ impl Data {
         Ok(slopes)
     }
 
-    /// A start for one more mode: the strongest line of the residual that is not within a relative distance `apart` of a
-    /// mode.
+    /// Start values for one more mode: the strongest line of the residual that is not within a relative distance
+    /// `apart` of a mode.
     pub fn next_pole(&self, so_far: &Modal, apart: f64) -> Option<Pole> {
         let left: Vec<f64> = (0..self.omega.len())
             .map(|i| self.weight[i] * (self.response[i] - so_far.response[i]).norm())
@@ -297,7 +298,7 @@ impl Data {
 struct PoleSearch<'a> {
     data: &'a Data,
     modes: usize,
-    /// Poles and delay of the last solution, and its linear parameters, at which derivatives are taken.
+    /// Poles and delay of the last solution, and its linear parameters, for the derivatives.
     solved: Mutex<(Vec<f64>, Vec<f64>)>,
 }
 
@@ -314,8 +315,8 @@ impl PoleSearch<'_> {
         }
     }
 
-    /// Derivatives of the model by σ and ω of each mode and the delay, with constant linear parameters; `all` is
-    /// overwritten.
+    /// Derivatives of the model with respect to σ and ω of each mode and the delay, at constant linear
+    /// parameters, written to `all`.
     fn slopes(
         &self,
         omega: f64,
@@ -419,7 +420,7 @@ impl Modal {
         &self.linear
     }
 
-    /// R of a mode, in the units of the response times s^(m−1), and the size of a unit of its linear parameters.
+    /// R of a mode, in the units of the response times s^(m−1), and the scale of its linear parameters.
     pub fn residue(&self, k: usize) -> (Complex64, f64) {
         let unit = self.scale.powi(1 - self.order);
         let residue = Complex64::new(self.linear[2 * k], self.linear[2 * k + 1]);
@@ -444,7 +445,7 @@ impl Modal {
         Some((turn, self.poles[strongest].omega_rad_per_s))
     }
 
-    /// Places of the modes of the stand, by rising frequency.
+    /// Indices of the modes of the stand, in ascending order of frequency.
     pub(super) fn of_stand(&self) -> Vec<usize> {
         let mut places: Vec<usize> = (0..self.poles.len())
             .filter(|k| self.foreign[*k].is_none())
@@ -453,8 +454,8 @@ impl Modal {
         places
     }
 
-    /// Derivatives of the static response `Σ 2 Re(−R/p) + c₁` of the stand by σ and ω of each mode, and by the linear
-    /// parameters.
+    /// Derivatives of the static response `Σ 2 Re(−R/p) + c₁` of the stand with respect to σ and ω of each mode, and
+    /// to the linear parameters.
     pub(super) fn slopes_at_rest(&self) -> (Vec<f64>, Vec<f64>) {
         let mut of_poles = Vec::new();
         let mut of_linear = Vec::new();
@@ -473,7 +474,7 @@ impl Modal {
         (of_poles, of_linear)
     }
 
-    /// Scale of s in them, in rad/s.
+    /// Scale of s in the linear parameters, in rad/s.
     pub(super) fn scale(&self) -> f64 {
         self.scale
     }

@@ -1,4 +1,4 @@
-//! The number of modes, chosen by the error on held-out blocks.
+//! Number of modes, chosen by the hold-out error.
 
 use torqcomp_dsp::frf::{self, Estimator, Powers};
 
@@ -8,20 +8,20 @@ use super::{Data, Effort, Modal, ResponseOptions};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::rounded;
 
-/// Relative distance in frequency below which no second mode is searched for, unless the number of modes is given: the
-/// residual of a slightly nonlinear mode lies beside its line.
+/// Relative frequency difference below which no second mode is searched for, unless the number of modes is given: the
+/// residual of a slightly nonlinear mode is close to its line.
 const APART: f64 = 0.03;
 
-/// Most modes tried.
+/// Maximum number of modes tried.
 const MOST_MODES: usize = 24;
 
-/// Modes without improvement after which no more are tried.
+/// Number of additional modes without improvement after which the search ends.
 const PATIENCE: usize = 3;
 
-/// Hold-out error of fewer modes, over the least, up to which they are preferred.
+/// Ratio of the hold-out error of fewer modes to the minimum, up to which they are preferred.
 const SLACK: f64 = 1.05;
 
-/// One mode more; `None` if there is no line left to start it at.
+/// Adds one mode; `None` if no line is left to start from.
 pub(super) fn grow(
     data: &Data,
     so_far: &Modal,
@@ -36,18 +36,18 @@ pub(super) fn grow(
     Ok(Some(data.fit(&starts, Effort::Coarse)?))
 }
 
-/// Folds of the blocks: each is held out once.
+/// Folds of the blocks; each is held out once.
 pub(super) fn folds(set: &Set) -> Vec<Vec<usize>> {
     let count = set.blocks.len();
     let folds = count.min(3);
-    // Neighbours in one fold, since segments overlap.
+    // Neighbours share a fold, since segments overlap.
     (0..folds)
         .map(|f| (count * f / folds..count * (f + 1) / folds).collect())
         .collect()
 }
 
-/// A coarse fit to all blocks, and the error on held-out blocks with 0, 1, 2, … modes, which chooses their number; if
-/// that is given, the error with it alone.
+/// A coarse fit to all blocks, and the hold-out errors for 0, 1, 2, … modes, which determine their number; if that is
+/// given, only its error.
 pub(super) fn order(
     set: &Set,
     lines: &Lines,
@@ -92,7 +92,7 @@ pub(super) fn order(
     Ok((grown(data, options, best)?, errors))
 }
 
-/// Data of each fold: all blocks but those held out.
+/// Data of each fold: all blocks except those held out.
 fn training(
     set: &Set,
     lines: &Lines,
@@ -108,7 +108,7 @@ fn training(
         .collect()
 }
 
-/// Mean error of each fold's model on the blocks held out from it.
+/// Mean error of each fold's model on its held-out blocks.
 fn held_out(set: &Set, lines: &Lines, folds: &[Vec<usize>], models: &[Modal]) -> f64 {
     let each = models.iter().zip(folds).flat_map(|(model, fold)| {
         fold.iter()
@@ -117,7 +117,7 @@ fn held_out(set: &Set, lines: &Lines, folds: &[Vec<usize>], models: &[Modal]) ->
     each.sum::<f64>() / set.blocks.len() as f64
 }
 
-/// Error on held-out blocks with the number of modes of the fit to all blocks alone.
+/// Hold-out error for the number of modes of the fit to all blocks only.
 pub(super) fn of_given(
     set: &Set,
     lines: &Lines,
@@ -136,7 +136,7 @@ pub(super) fn of_given(
     Ok(errors)
 }
 
-/// Error on held-out blocks with 0, 1, 2, … modes, until more do not help.
+/// Hold-out errors for 0, 1, 2, … modes, until more do not help.
 fn tried(
     set: &Set,
     lines: &Lines,
@@ -152,7 +152,7 @@ fn tried(
     let error = |models: &[Modal]| held_out(set, lines, folds, models);
     let mut errors = vec![error(&models)];
     let mut since = 0;
-    // The error of the response itself, one number for each line, is a lower bound: once it is reached, more modes would
+    // The error of the response itself, one parameter per line, is a lower bound: once it is reached, more modes would
     // not be chosen.
     let raw = &set.powers.response(Estimator::H1).response[lines.clone()];
     let floor = set.error(raw, lines);
@@ -170,7 +170,7 @@ fn tried(
     Ok(errors)
 }
 
-/// A model for each fold, each on a thread of its own.
+/// A model for each fold, each in its own thread.
 fn side_by_side(
     training: &[Data],
     fit: impl Fn(&Data, usize) -> Result<Modal, Failure> + Sync,
@@ -189,7 +189,7 @@ fn side_by_side(
     })
 }
 
-/// A coarse fit with so many modes, added one by one.
+/// A coarse fit of `count` modes, added one by one.
 fn grown(data: &Data, options: &ResponseOptions, count: usize) -> Result<Modal, Failure> {
     let mut fitted = data.fit(&[], Effort::Coarse)?;
     for _ in 0..count {

@@ -11,7 +11,8 @@ use crate::chart::{Chart, Series};
 use crate::identify::{Comparison, Identification, NamedEstimate};
 use crate::print::{plural, relative, rounded, short};
 
-/// Adds every mode of the stand with its natural frequency and damping ratio, by rising frequency.
+/// Adds natural frequency and damping ratio of every mode of the stand, in ascending order of
+/// frequency.
 pub(super) fn add_modes(result: &mut Identification, fitted: &FinalFit) {
     let modal = &fitted.modal;
     let order = modal.of_stand();
@@ -33,7 +34,7 @@ pub(super) fn add_modes(result: &mut Identification, fitted: &FinalFit) {
     }
 }
 
-/// Adds what each mode has in the response.
+/// Adds the contribution of each mode to the response.
 pub(super) fn add_shares(result: &mut Identification) {
     let Some(shares) = result.shares.clone() else {
         return;
@@ -44,7 +45,7 @@ pub(super) fn add_shares(result: &mut Identification) {
     }
 }
 
-/// Says what was fitted.
+/// Describes the fit.
 pub(super) fn method(
     result: &mut Identification,
     set: &Set,
@@ -98,7 +99,7 @@ pub(super) fn other_constants(
     }
 }
 
-/// Root mean square of the measured signal in the band, over all blocks.
+/// RMS of the measured signal in the band, over all blocks.
 pub(super) fn output_rms(set: &Set, lines: &Lines) -> f64 {
     let power: f64 = set
         .blocks
@@ -114,7 +115,7 @@ pub(super) fn output_rms(set: &Set, lines: &Lines) -> f64 {
     (2.0 * power / set.blocks.len() as f64).sqrt() / length
 }
 
-/// Adds what the response itself shows: its error, its levels, its plots.
+/// Adds results of the response itself: its error, its levels, its plots.
 pub(super) fn spectra(result: &mut Identification, set: &Set, lines: &Lines, fitted: &Modal) {
     raw_error(result, set, lines);
     levels(result, set, lines);
@@ -139,7 +140,7 @@ fn raw_error(result: &mut Identification, set: &Set, lines: &Lines) {
             .sum::<f64>();
     }
     let percent = 100.0 * sum / set.blocks.len() as f64;
-    // Lines at which all other blocks have no force say nothing.
+    // Lines at which all other blocks have no force are inconclusive.
     if !percent.is_finite() {
         return;
     }
@@ -150,10 +151,10 @@ fn raw_error(result: &mut Identification, set: &Set, lines: &Lines) {
     });
 }
 
-/// Relative difference between the responses of records from which there is a warning.
+/// Minimum reported relative difference between the responses of records.
 const DIFFERENT: f64 = 0.1;
 
-/// Compares the responses of records at different levels, which are the same for a linear stand.
+/// Compares the responses of records at different levels, which are equal for a linear stand.
 fn levels(result: &mut Identification, set: &Set, lines: &Lines) {
     let mut records = set.record.clone();
     records.dedup();
@@ -193,10 +194,11 @@ fn levels(result: &mut Identification, set: &Set, lines: &Lines) {
     }
 }
 
-/// Label of the magnitude, whose unit is that of the channels.
+/// Label of the magnitude, with the unit of the channels.
 pub(crate) const RATIO: &str = "measured per applied";
 
-/// Magnitude with its bounds, phase and coherence, the model, and the error against the number of modes if that was chosen.
+/// Magnitude with its bounds, phase and coherence, the model, and the error over the number of modes if that was
+/// chosen.
 fn draw(result: &mut Identification, set: &Set, lines: &Lines, fitted: &Modal) {
     let h1 = set.powers.response(Estimator::H1);
     let hz: Vec<f64> = lines.clone().map(|k| k as f64 * set.step_hz).collect();

@@ -4,24 +4,25 @@
 //! Cov p = (JᵀJ)⁻¹ · ½ Re(J̄ᵀ Γ J) · (JᵀJ)⁻¹,   Γ_kl = s_k s_l d(k − l) Σ_b X̄_kb X_lb / √(S_k S_l)
 //! ```
 //!
-//! J: derivatives of the weighted model at each line, projected off those by the other residues; Γ: covariance of the
-//! weighted errors of H1 at lines k and l, where the noise of the measured signal changes little from line to line;
-//! X_kb: applied signal at line k of block b, S_k = Σ_b |X_kb|²; d: transform of the squared window over its value at 0,
-//! which correlates neighbouring lines; s_k²: power of the weighted errors, from the scatter of the response between
-//! blocks, or from the residuals where they are larger or there is only one block. One block also does not show the error of
-//! the applied signal, |H|² N/|X|²: the fit follows it where it matters, at the resonance. Its power N, of noise and of what
-//! is folded, is that of the applied signal near half the sampling rate. (R. Pintelon, J. Schoukens, System
-//! Identification, 2nd ed., 2012, 2.6 and 9; J. S. Bendat, A. G. Piersol, Random Data, 4th ed., 2010, 9.2.)
+//! J: derivatives of the weighted model at each line, projected off those with respect to the other residues; Γ:
+//! covariance of the weighted errors of H1 at lines k and l, where the noise of the measured signal changes little from
+//! line to line; X_kb: applied signal at line k of block b, S_k = Σ_b |X_kb|²; d: transform of the squared window over
+//! its value at 0, which correlates neighbouring lines; s_k²: power of the weighted errors, from the scatter of the
+//! response between blocks, or from the residuals where they are larger or there is only one block. A single block does
+//! not reveal the error of the applied signal, |H|² N/|X|², either: the fit follows it where it matters, at the
+//! resonance. Its power N, of noise and aliasing, is that of the applied signal near the Nyquist frequency. (R.
+//! Pintelon, J. Schoukens, System Identification, 2nd ed., 2012, 2.6 and 9; J. S. Bendat, A. G. Piersol, Random Data,
+//! 4th ed., 2010, 9.2.)
 //!
-//! Besides, from the change that each block makes:
+//! In addition, from the contribution of each block:
 //!
 //! ```text
 //! Cov p = (JᵀJ)⁻¹ Σ_b u_b u_bᵀ (JᵀJ)⁻¹ n/(n − 1),   u_b = Re Σ_k J̄_k w_k X̄_kb (Y_kb − H1_k X_kb)/S_k
 //! ```
 //!
-//! (the jackknife for small changes: B. Efron, The Jackknife, 1982, 6.3; overlapping segments together with their
-//! neighbours). It needs no model of the noise and includes leakage and differences between hits, but scatters with few
-//! blocks. So it is used alone from [`MANY`] blocks on, and before that where it is significantly larger.
+//! (the infinitesimal jackknife: B. Efron, The Jackknife, 1982, 6.3; overlapping segments together with their
+//! neighbours). It needs no model of the noise and includes leakage and differences between hits, but is imprecise with
+//! few blocks. So it is used alone from [`MANY`] blocks on, and below that where it is significantly larger.
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -35,21 +36,22 @@ use super::lines::Lines;
 use super::{Data, Modal};
 use crate::failure::Failure;
 
-/// Fewest blocks for their scatter alone to give the uncertainty.
+/// Number of blocks from which their scatter alone gives the uncertainty.
 const MANY: usize = 20;
-/// Fewest blocks whose scatter is used.
+/// Minimum number of blocks whose scatter is used.
 const FEW: usize = 3;
 /// Significance level of the test for scatter between blocks.
 const CHANCE: f64 = 0.05;
 /// Distance in lines beyond which errors count as independent.
 const REACH: usize = 40;
-/// Weight over the largest below which a line does not count.
+/// Weight, relative to the largest, below which a line is ignored.
 const SILENT: f64 = 1e-3;
-/// Lines on each side over which the power of the errors is averaged.
+/// Number of lines on each side over which the power of the errors is averaged.
 const NEIGHBOURS: usize = 5;
-/// Part of the lines, up to half the sampling rate, that show the noise and the folding of the applied signal.
+/// Divisor of the number of lines that gives those, just below the Nyquist frequency, used for noise and aliasing
+/// of the applied signal.
 const TOP: usize = 10;
-/// Part of the noise's amplitude that half-overlapping Hann-weighted segments share.
+/// Correlation of the noise amplitude of half-overlapping Hann-weighted segments.
 const SHARED: f64 = 1.0 / 6.0;
 
 /// Covariance of poles and delay and, for a single mode, of the real and imaginary part of its residue.
@@ -120,9 +122,9 @@ fn covariance(
 
 /// The fit, linearised at its minimum.
 struct Linearised {
-    /// Parameters that are not at a bound: poles and delay, then the first linear parameters.
+    /// Parameters not at a bound: poles and delay, then the first linear parameters.
     free: Vec<usize>,
-    /// Number of poles and delay.
+    /// Number of parameters for poles and delay.
     searched: usize,
     /// J of the free parameters.
     slopes: DMatrix<f64>,
@@ -132,7 +134,7 @@ struct Linearised {
 }
 
 impl Linearised {
-    /// With the first `linear` linear parameters.
+    /// Includes the first `linear` linear parameters.
     fn of(data: &Data, fitted: &Modal, linear: usize) -> Result<Option<Self>, Failure> {
         let Some(fit) = &fitted.fit else {
             return Ok(None);
@@ -163,7 +165,7 @@ fn applied_power(set: &Set, lines: &Lines) -> Vec<f64> {
     lines.clone().map(power).collect()
 }
 
-/// From the change that each block makes.
+/// Estimate from the contribution of each block.
 fn from_blocks(set: &Set, lines: &Lines, data: &Data, solved: &Linearised) -> DMatrix<f64> {
     let (count, columns) = (lines.len(), solved.free.len());
     let h1 = &data.response;
@@ -193,7 +195,7 @@ fn from_blocks(set: &Set, lines: &Lines, data: &Data, solved: &Linearised) -> DM
     &solved.inverse * sum * &solved.inverse * freedom
 }
 
-/// From the power of the errors and the window.
+/// Estimate from the power of the errors and the window.
 fn from_noise(
     set: &Set,
     lines: &Lines,
@@ -216,7 +218,8 @@ fn from_noise(
     &solved.inverse * middle * &solved.inverse
 }
 
-/// s_k of each line of one block; `power` is the mean power of the residuals over the lines that count.
+/// s_k of each line for one block; `power` is the mean power of the residuals over the lines that
+/// count.
 fn sizes_of_one(
     set: &Set,
     lines: &Lines,
@@ -228,7 +231,7 @@ fn sizes_of_one(
     unseen.into_iter().map(|u| (power + u).sqrt()).collect()
 }
 
-/// Power of the weighted errors that the error of the applied signal of one block makes, by line.
+/// Power of the weighted errors due to the error of the applied signal in one block, by line.
 fn power_of_force_error(set: &Set, lines: &Lines, data: &Data, response: &[Complex64]) -> Vec<f64> {
     let applied = set.blocks.first().map_or(&[][..], |block| &block.applied);
     let top = &applied[applied.len() - applied.len() / TOP..];
@@ -242,7 +245,7 @@ fn power_of_force_error(set: &Set, lines: &Lines, data: &Data, response: &[Compl
     lines.clone().enumerate().map(size).collect()
 }
 
-/// Whether the error of the force decides the uncertainty of a fit to one block.
+/// Whether the error of the force dominates the uncertainty of a fit to one block.
 pub(super) fn is_of_force(set: &Set, lines: &Lines, data: &Data, fitted: &Modal) -> bool {
     let squares = fitted.fit.as_ref().map_or(0.0, |f| f.sum_of_squares);
     let of_force = power_of_force_error(set, lines, data, &fitted.response);
@@ -357,7 +360,7 @@ fn line_correlation(window: Window, lag: usize, length: usize) -> Complex64 {
 mod tests {
     use super::*;
 
-    /// The transform of the squared window, by its sum.
+    /// Against the transform of the squared window by direct summation.
     #[test]
     fn lines_are_correlated_by_the_window() {
         let n = 512;
@@ -377,7 +380,7 @@ mod tests {
                 "{lag}"
             );
             let want = sum(lag, &fall) / sum(0, &fall);
-            // The window is cut off at 1 %, so at 1e-4 of the power.
+            // The window is truncated at 1 %, i.e. 1e-4 of the power.
             let got = line_correlation(Window::Exponential(tau), lag, n);
             assert!((got - want).norm() < 3e-4, "{lag}: {got} {want}");
         }

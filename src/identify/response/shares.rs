@@ -1,10 +1,10 @@
-//! What each mode has in the response of a stand: residues over the response at rest.
+//! Contribution of each mode to the response of a stand: residues relative to the static response.
 //!
 //! ```text
 //! R/(s − p) + R*/(s − p*) = (r + q s/ω_n) ω_n²/(s² + 2σ s + ω_n²),   r = −2 Re(R/p),   q = 2 Re R/ω_n
 //! ```
 //!
-//! and `r` and `q` are divided by the response at rest, the sum of all `r` and of `c₁`.
+//! and `r` and `q` are divided by the static response, the sum of all `r` and of `c₁`.
 
 use std::f64::consts::TAU;
 
@@ -13,10 +13,11 @@ use torqcomp_model::{Estimate, Estimates};
 use super::{FinalFit, foreign};
 use crate::identify::{MODE_NUMBERS, ModalShares, NamedEstimates};
 
-/// Unit of each number of a mode.
+/// Units of the numbers of a mode.
 const UNITS: [&str; 4] = ["Hz", "", "", ""];
 
-/// The shares of all modes, by rising frequency; `None` if the response at rest is zero.
+/// Contributions of all modes, in ascending order of frequency; `None` if the static response is
+/// zero.
 pub(super) fn of(found: &FinalFit, order: i32) -> Option<ModalShares> {
     let modal = &found.modal;
     let at_rest = modal.at_rest();
@@ -46,7 +47,7 @@ pub(super) fn of(found: &FinalFit, order: i32) -> Option<ModalShares> {
     })
 }
 
-/// The numbers of a mode, and their gradients by poles, delay and linear parameters.
+/// The numbers of a mode, and their gradients with respect to poles, delay and linear parameters.
 fn of_mode(found: &FinalFit, k: usize, count: usize) -> ([f64; 4], [Vec<f64>; 4]) {
     let modal = &found.modal;
     let at_rest = modal.at_rest();
@@ -64,7 +65,7 @@ fn of_mode(found: &FinalFit, k: usize, count: usize) -> ([f64; 4], [Vec<f64>; 4]
     rows[0][pole + 1] = omega / TAU;
     rows[1][pole] = omega * omega / natural;
     rows[1][pole + 1] = -sigma * omega / natural;
-    // The response at rest divides both residues.
+    // Both residues are divided by the static response.
     for (row, share) in [(2, r), (3, q)] {
         for (to, slope) in rows[row].iter_mut().zip(&of_poles) {
             *to = -share * slope / at_rest;

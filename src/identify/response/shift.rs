@@ -1,4 +1,4 @@
-//! Channels that are shifted in time against each other.
+//! Time shift between the channels.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -11,19 +11,21 @@ use crate::failure::Failure;
 use crate::identify::Identification;
 use crate::print::rounded;
 
-/// Most modes beside a delay that are tried.
+/// Maximum number of modes tried together with a delay.
 const MOST_MODES: usize = 3;
-/// Residual of whole records with a delay, over that without, up to which there is one.
+/// Ratio of the residual of whole records with a delay to that without, up to which there is a
+/// delay.
 const CLEARLY_LESS: f64 = 0.97;
-/// Sine of the angle by which the strongest mode is turned, from which on a delay is looked for.
+/// Sine of the phase of the strongest mode's residue above which a delay is considered.
 const TURNED: f64 = 0.05;
-/// Angles of the strongest mode by which delays to be tried differ.
+/// Spacings of trial delays, as phase of the strongest mode.
 const STEPS_RAD: [f64; 3] = [0.4, 0.1, 0.02];
-/// Residual with a delay that moves, over that with the best one, up to which it is the same fit.
+/// Ratio of the residual with a fitted delay to that with the best trial delay, up to which the
+/// fits are equal.
 const AS_GOOD: f64 = 1.001;
 
-/// The fit with a delay, if that explains the response with fewer modes at least as well as `coarse` does without: a delay
-/// is no sum of modes, so that many of them stand for one.
+/// The fit with a delay, if that explains the response with fewer modes at least as well as `coarse` does without: a
+/// delay is not a sum of modes, so many modes are needed to imitate one.
 ///
 /// # Errors
 /// If there are too few lines.
@@ -51,8 +53,9 @@ pub(super) fn of(
     Ok(None)
 }
 
-/// The fit of whole records with a delay, if that leaves clearly less than `fitted` without, or no more with fewer modes, and turns
-/// the strongest mode to where a torque puts it: `R = ∓j/(2 J ω_d)`.
+/// The fit of whole records with a delay, if its residual is clearly smaller than that of `fitted` without, or no
+/// larger with fewer modes, and it turns the residue of the strongest mode to its phase for a torque:
+/// `R = ∓j/(2 J ω_d)`.
 ///
 /// # Errors
 /// If there are too few lines.
@@ -90,8 +93,8 @@ pub(super) fn of_whole(
     Ok(found.filter(is_better))
 }
 
-/// The fit of whole records from that of the averaged response; where delay and modes do not converge together, that with the
-/// best delay. `None` if none converges.
+/// The fit of whole records, starting from that of the averaged response; if delay and modes do not converge together,
+/// with the best delay. `None` if none converges.
 ///
 /// # Errors
 /// If there are too few lines.
@@ -107,9 +110,9 @@ pub(super) fn refined(
     }
 }
 
-/// The fit with the delay that leaves least. A delay and the phase of a mode look alike near the resonance, so that steps in both
-/// at once go astray: delays are tried first, and the parabola through three of them gives the next. Then both move together, if
-/// that converges.
+/// The fit with the delay that minimises the residual. A delay and the phase of a mode are nearly equivalent near the
+/// resonance, so that joint steps may diverge: trial delays come first, then the parabola through three of them.
+/// Finally both are fitted together, if that converges.
 fn best_delay(
     whole: &mut Whole,
     set: &Set,
@@ -158,7 +161,7 @@ fn best_delay(
     Ok(Some(together.filter(is_as_good).unwrap_or(fixed)))
 }
 
-/// Fits with a delay and 1, 2, … modes, fewer than so many, each from the one before.
+/// Fits with a delay and 1, 2, … modes, fewer than a limit, each starting from the previous one.
 fn with_fewer_modes(
     data: &Data,
     count: usize,
@@ -177,7 +180,7 @@ fn with_fewer_modes(
     })
 }
 
-/// The delays that turn the strongest mode as a model has it, for a response of either sign.
+/// The delays that explain the phase of a model's strongest mode, for a response of either sign.
 fn delays_of(modal: &Modal) -> Vec<f64> {
     let Some((turn, omega)) = modal.strongest_turn() else {
         return Vec::new();
@@ -189,13 +192,13 @@ fn delays_of(modal: &Modal) -> Vec<f64> {
     [-FRAC_PI_2, FRAC_PI_2].map(delay).into()
 }
 
-/// Sine of the angle by which the strongest mode is turned.
+/// Sine of the phase of the strongest mode's residue.
 fn turned_by(modal: &Modal) -> f64 {
     let turn = modal.strongest_turn();
     turn.map_or(0.0, |(turn, _)| turn.cos().abs())
 }
 
-/// Says which channel is late.
+/// Reports which channel is late.
 pub(super) fn warn(result: &mut Identification, delay_s: f64) {
     let which = match delay_s < 0.0 {
         true => "applied",

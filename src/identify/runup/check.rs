@@ -1,9 +1,9 @@
-//! Refusal of records that show no run.
+//! Rejection of records without a run.
 
 use super::{FreeRun, LEAST_WINDOWS, SHORTEST_HALF};
 use crate::failure::{ErrorCode, Failure};
 
-/// Refuses records that are too short, have gaps, or do not change.
+/// Rejects records that are too short, have gaps, or are constant.
 pub(super) fn check(run: &FreeRun) -> Result<(), Failure> {
     if run.motion.len() != run.effort.len() {
         return Err(Failure::failed(

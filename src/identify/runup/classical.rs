@@ -10,7 +10,7 @@ use crate::failure::Failure;
 use crate::identify::{Comparison, FitQuality, Motion, NamedEstimate, rms};
 use crate::print::short;
 
-/// Order of the low-pass, each way.
+/// Order of the low-pass in each direction.
 const ORDER: u32 = 4;
 
 /// Low-pass on all channels, central differences, every n-th sample, least squares. `None` for an acceleration, which

@@ -7,20 +7,20 @@ use super::{FreeRun, SHORTEST_HALF};
 use crate::failure::Failure;
 use crate::identify::Motion;
 
-/// Smallest part of a record that counts as motion in a direction.
+/// Minimum fraction of a record that counts as motion in a direction.
 const DIRECTION: f64 = 0.02;
 
-/// Samples next to an uncertain stretch whose direction smoothing may have changed.
+/// Samples next to an uncertain interval whose direction smoothing may have changed.
 const NEAR: usize = 2;
 
-/// Speed at every sample and its direction.
+/// Speed and direction at every sample.
 pub(in crate::identify) struct Directions {
     /// Speed; `None` for an acceleration, which gives it only up to a constant.
     pub speed: Option<Vec<f64>>,
     /// Mean sign of the speed over a sample's interval, −1 to 1; proportional to the speed where that is within the
     /// noise.
     pub sign: Vec<f64>,
-    /// Whether the body stands, reverses or moves too slowly at a sample, or within the smoothing of the speed
+    /// Whether the body stops, reverses or moves too slowly at a sample, or within the smoothing of the speed
     /// around it.
     pub unsure: Vec<bool>,
     forward: bool,
@@ -31,7 +31,7 @@ impl Directions {
     /// Directions in a run.
     ///
     /// # Errors
-    /// If the record is too short for the window of the speed.
+    /// If the record is too short for the speed window.
     pub fn of(run: &FreeRun) -> Result<Self, Failure> {
         let count = run.motion.len();
         if run.kind == Motion::Acceleration {
@@ -57,7 +57,7 @@ impl Directions {
         for (from, to) in uncertain {
             let (first, last) = (from.saturating_sub(half), (to + half).min(count - 1));
             unsure[first..=last].fill(true);
-            // If it moves the other way afterwards, it reversed or stood in between.
+            // An opposite direction afterwards means that it reversed or stopped in between.
             let turns = from > 0 && to < count && sign[from - 1] * sign[to.min(count - 1)] < 0.0;
             if turns && let Turn::At(place) = speeds.turn(from.saturating_sub(NEAR), to + NEAR) {
                 let way = sign[from - 1];
@@ -73,7 +73,7 @@ impl Directions {
         })
     }
 
-    /// Whether the body moved both ways.
+    /// Whether the body moved in both directions.
     pub fn both(&self) -> bool {
         self.forward && self.backward
     }
@@ -96,8 +96,8 @@ fn smoothed(run: &FreeRun, half: usize) -> Result<(Vec<f64>, Vec<f64>), Failure>
     Ok((speed, sign))
 }
 
-/// Stretches of uncertain direction: the first sample, and the first one after. Between two samples of opposite
-/// direction the stretch is empty.
+/// Intervals of uncertain direction: the first sample, and the first one after. Between two samples of opposite
+/// direction the interval is empty.
 fn uncertain(sign: &[f64]) -> Vec<(usize, usize)> {
     let mut found = Vec::new();
     let mut i = 0;
@@ -115,9 +115,9 @@ fn uncertain(sign: &[f64]) -> Vec<(usize, usize)> {
     found
 }
 
-/// Writes a step of the sign at a place between two samples: averaged with the weights 1 − x and x of the neighbours,
-/// a part a of the interval being before the step, it adds a − a²/2 − (½ − a + a²/2) to the one and
-/// a²/2 − (½ − a²/2) to the other.
+/// Writes a sign change at a position between two samples: averaged with the weights 1 − x and x of the neighbours,
+/// with a fraction a of the interval before the step, it adds a − a²/2 − (½ − a + a²/2) to the one and a²/2 − (½ −
+/// a²/2) to the other.
 fn step(sign: &mut [f64], way: f64, place: f64, from: usize, to: usize) {
     for (i, s) in sign.iter_mut().enumerate().take(to + 1).skip(from) {
         *s = if (i as f64) <= place { way } else { -way };

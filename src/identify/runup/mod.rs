@@ -1,11 +1,11 @@
-//! Inertia and friction of a free body from its motion and the torque (or force) that drives it.
+//! Inertia and friction of a free body from its motion and the driving torque (or force).
 //!
 //! ```text
 //! T = J θ'' + f θ' + F_c sgn θ' + C          (C1) with dry friction
 //! ```
 //!
-//! The equation is averaged over smooth windows ([`torqcomp_dsp::weak`]), which gives derivatives without differences,
-//! and solved by least squares, the bias from noise of the motion being removed from the normal equations. For
+//! The equation is averaged over smooth windows ([`torqcomp_dsp::weak`]), which gives derivatives without finite
+//! differences, and solved by least squares, with the bias from motion noise removed from the normal equations. For
 //! comparison, the classical method of robot identification: zero-phase low-pass, central differences, least squares
 //! (M. Gautier, Dynamic identification of robots with power model, ICRA 1997).
 
@@ -23,12 +23,12 @@ use crate::failure::Failure;
 use directions::Directions;
 use windows::{WindowRows, plateau};
 
-/// How the body moves, which decides names and units of the constants.
+/// Type of motion, which determines names and units of the constants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Body {
-    /// Angles and torques.
+    /// Rotation: angles and torques.
     Turning,
-    /// Lengths and forces.
+    /// Translation: lengths and forces.
     Sliding,
 }
 
@@ -58,30 +58,30 @@ impl Body {
 /// A record of a run, in SI units.
 #[derive(Debug, Clone, Copy)]
 pub struct FreeRun<'a> {
-    /// Samples a second.
+    /// Sampling rate in Hz.
     pub rate_hz: f64,
-    /// The motion.
+    /// Motion signal.
     pub motion: &'a [f64],
-    /// What the motion is.
+    /// Quantity of the motion signal.
     pub kind: Motion,
     /// Torque or force.
     pub effort: &'a [f64],
-    /// Turning or sliding.
+    /// Rotation or translation.
     pub body: Body,
 }
 
-/// How a run is evaluated.
+/// Options for the evaluation of a run.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct RunupOptions {
-    /// Whether viscous friction may differ by direction.
+    /// Whether viscous friction may depend on direction.
     pub by_direction: bool,
     /// Half of the averaging window in seconds; chosen from the data if not given.
     pub half_window_s: Option<f64>,
 }
 
-/// Growth of an uncertainty by autocorrelation that is reported.
+/// Minimum reported increase of an uncertainty due to autocorrelation.
 const COLOURED: f64 = 1.3;
-/// Fewest windows in a record.
+/// Minimum number of windows in a record.
 const LEAST_WINDOWS: usize = 12;
 /// Half of the shortest window tried, in samples.
 const SHORTEST_HALF: usize = 8;
@@ -89,7 +89,7 @@ const SHORTEST_HALF: usize = 8;
 /// Evaluates a run.
 ///
 /// # Errors
-/// If the record is too short, holds no motion, or the channels differ in length.
+/// If the record is too short, contains no motion, or the channels differ in length.
 pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification, Failure> {
     check::check(run)?;
     let directions = Directions::of(run)?;

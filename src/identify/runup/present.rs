@@ -7,7 +7,7 @@ use crate::chart::{Chart, Series};
 use crate::identify::{Identification, Motion};
 use crate::print::{rounded, short};
 
-/// Noise in a regressor, as a part of its power, above which there is a warning.
+/// Noise power in a regressor, relative to its total, above which a warning is given.
 const NOISY: f64 = 0.2;
 
 /// Names and units of the columns.
@@ -33,7 +33,7 @@ pub(super) fn names(
     names
 }
 
-/// Says how the run was evaluated.
+/// Describes the evaluation of the run.
 pub(super) fn method(result: &mut Identification, run: &FreeRun, fitted: &FittedRows) {
     let all = fitted.used.len();
     let used = fitted.used.iter().filter(|u| **u).count();
@@ -56,7 +56,7 @@ pub(super) fn method(result: &mut Identification, run: &FreeRun, fitted: &Fitted
     }
 }
 
-/// Torque as measured and from the motion, and the residual.
+/// Measured torque, torque from the motion, and the residual.
 pub(super) fn draw(result: &mut Identification, run: &FreeRun, fitted: &FittedRows) {
     let (half, stride) = (fitted.rows.half, fitted.rows.stride);
     let right = &fitted.rows.right;
@@ -80,7 +80,7 @@ pub(super) fn draw(result: &mut Identification, run: &FreeRun, fitted: &FittedRo
     ]);
 }
 
-/// Warns about what the run cannot show, noise, and negative constants.
+/// Warns about unidentifiable terms, noise, and negative constants.
 pub(super) fn warnings(
     result: &mut Identification,
     run: &FreeRun,
@@ -144,7 +144,7 @@ fn shifted(result: &mut Identification, fitted: &FittedRows) {
     );
 }
 
-/// Residual over the torque above which the fit is poor.
+/// Residual relative to the torque above which the fit is poor.
 const POOR: f64 = 0.3;
 
 /// Warns if the motion does not explain the torque.

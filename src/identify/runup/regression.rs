@@ -1,4 +1,4 @@
-//! Least squares whose regressors carry noise of known covariance, over rows that overlap.
+//! Least squares over overlapping rows, with regressor noise of known covariance.
 
 use nalgebra::{DMatrix, DVector};
 use torqcomp_model::{Covariance, Estimates};
@@ -6,15 +6,16 @@ use torqcomp_model::{Covariance, Estimates};
 use super::scatter;
 use crate::failure::{ErrorCode, Failure};
 
-/// Errors of the rows.
+/// Error model of the rows.
 pub(super) struct Errors<'a> {
     /// Covariance of the errors of two columns in one row.
     pub noise: &'a dyn Fn(usize, usize) -> f64,
-    /// Covariance between rows so far apart of errors of the right side, of variance 1 a sample.
+    /// Covariance between rows at a distance, for white errors of the right-hand side with variance
+    /// 1.
     pub torque: &'a dyn Fn(usize) -> f64,
-    /// The same of errors of the columns for these parameters.
+    /// The same for errors of the columns with these parameters.
     pub motion: &'a dyn Fn(usize, &[f64]) -> f64,
-    /// Rows up to which they overlap.
+    /// Largest distance of overlapping rows.
     pub overlap: usize,
 }
 
@@ -23,9 +24,9 @@ pub(super) struct Errors<'a> {
 pub(super) struct Corrected {
     /// The parameters.
     pub numbers: Estimates,
-    /// Left side minus right side, of all rows.
+    /// Left-hand side minus right-hand side, for all rows.
     pub residuals: Vec<f64>,
-    /// Noise in a column, as a part of its power; the largest.
+    /// Largest noise power in a column, relative to its total.
     pub noise_share: f64,
     /// Largest ratio of a standard uncertainty to that for white noise.
     pub coloured: f64,
@@ -33,8 +34,8 @@ pub(super) struct Corrected {
 
 /// Solves `A x ≈ b` over the chosen rows, where the errors of the columns have a known covariance N in
 /// every row: `(AᵀA − n N) x = Aᵀb` (T. Söderström, Errors-in-variables methods in system
-/// identification, Automatica 43 (2007), 939, bias-compensating least squares). Its covariance is
-/// that of [`scatter`].
+/// identification, Automatica 43 (2007), 939, bias-compensating least squares). For its covariance see
+/// [`scatter`].
 pub(super) fn solve(
     columns: &[Vec<f64>],
     right: &[f64],
@@ -43,7 +44,7 @@ pub(super) fn solve(
 ) -> Result<Corrected, Failure> {
     let rows = chosen.iter().filter(|c| **c).count();
     let (all, count) = (right.len(), columns.len());
-    // Rows that are not chosen become zeros, so that distances in time stay.
+    // Excluded rows become zeros, to keep distances in time.
     let kept = |r: usize, v: f64| if chosen[r] { v } else { 0.0 };
     let mut scaled = DMatrix::from_fn(all, count, |r, c| kept(r, columns[c][r]));
     let b = DVector::from_fn(all, |r, _| kept(r, right[r]));
@@ -83,14 +84,14 @@ pub(super) fn solve(
     })
 }
 
-/// Left side minus right side of each row.
+/// Left-hand side minus right-hand side of each row.
 fn residuals(columns: &[Vec<f64>], values: &[f64], right: &[f64]) -> Vec<f64> {
     let mut left = left_side(columns, values);
     left.iter_mut().zip(right).for_each(|(l, b)| *l -= b);
     left
 }
 
-/// Left side of each row, for these parameters.
+/// Left-hand side of each row with these parameters.
 pub(super) fn left_side(columns: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
     let mut left = vec![0.0; columns.first().map_or(0, Vec::len)];
     for (column, value) in columns.iter().zip(values) {

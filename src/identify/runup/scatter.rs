@@ -5,9 +5,9 @@
 //! ```
 //!
 //! Ω is estimated twice. *White*: noise of torque and motion is white from sample to sample, and the shape of the
-//! window gives the correlation of rows that overlap; only the variance of the noise comes from the residuals.
+//! window gives the correlation of overlapping rows; only the variance of the noise comes from the residuals.
 //! *Coloured*: from the residuals themselves (W. K. Newey, K. D. West, Econometrica 55 (1987), 703), which includes
-//! the error of an incomplete model. The coloured estimate scatters more and is too small on average, so it is used
+//! the error of an incomplete model. The coloured estimate has more scatter and is biased low, so it is used only
 //! where it is the larger one.
 
 use nalgebra::{DMatrix, DVector};
@@ -42,7 +42,7 @@ pub(super) fn covariance(
     (joined, largest)
 }
 
-/// Covariance of rows 0, 1, … windows apart: from noise of the motion, and of the torque for the rest of the power of
+/// Covariance of rows 0, 1, … windows apart: from motion noise, and from torque noise for the rest of the power of
 /// the residuals.
 fn shape(power: f64, values: &[f64], errors: &Errors) -> Vec<f64> {
     let motion: Vec<f64> = (0..=errors.overlap)

@@ -1,23 +1,23 @@
-//! Moments at which a body reverses, from the motion on either side.
+//! Reversals of a body, located from the motion on either side.
 //!
-//! Dry friction jumps where the speed crosses zero, and with it the acceleration: the speed has a kink there, which
+//! Dry friction, and with it the acceleration, jumps at a zero crossing of the speed: the speed has a kink there, which
 //! smoothing would shift. So one parabola is fitted to the speed before and another to the speed after; both reach zero
-//! at one moment if the body reverses, and at two if it stands in between.
+//! at the same moment if the body reverses, and at two if it stops in between.
 
 use nalgebra::{DMatrix, DVector};
 
 /// Motion of a body where the sign of its speed is uncertain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Turn {
-    /// It reverses at that place, in samples.
+    /// It reverses at this position, in samples.
     At(f64),
-    /// It stands, or moves too slowly to locate a reversal.
+    /// It stops, or moves too slowly to locate a reversal.
     Stands,
 }
 
-/// Distance of both zeros, in samples and beyond what noise explains, from which the body stands.
+/// Distance of both zeros, in samples and beyond what noise explains, above which the body stops.
 const APART: f64 = 0.2;
-/// Standard deviations that noise explains.
+/// Number of standard deviations explained by noise.
 const CERTAIN: f64 = 4.0;
 
 /// Speeds of a record near a reversal.
@@ -26,12 +26,12 @@ pub(super) struct Speeds<'a> {
     pub motion: &'a [f64],
     /// Whether the motion is a position.
     pub is_position: bool,
-    /// Samples on each side that a parabola is fitted to.
+    /// Number of samples on each side for a parabola.
     pub reach: usize,
 }
 
 impl Speeds<'_> {
-    /// Speed in units of the motion a sample (or as it is), and its place in samples.
+    /// Speed in units of the motion per sample (or as given), and its position in samples.
     fn at(&self, i: usize) -> (f64, f64) {
         if self.is_position {
             (i as f64 + 0.5, self.motion[i + 1] - self.motion[i])
@@ -52,13 +52,13 @@ impl Speeds<'_> {
         if (left.0 - right.0).abs() > APART + noise {
             return Turn::Stands;
         }
-        // Weighted with their uncertainties.
+        // Weighted by their uncertainties.
         let floor = 1e-9;
         let (a, b) = ((left.1 + floor).powi(-2), (right.1 + floor).powi(-2));
         Turn::At((a * left.0 + b * right.0) / (a + b))
     }
 
-    /// Zero near a place of a parabola fitted to these speeds, and its standard uncertainty.
+    /// Zero, near a position, of a parabola fitted to these speeds, and its standard uncertainty.
     fn zero(&self, samples: &[usize], near: usize) -> Option<(f64, f64)> {
         if samples.len() < 6 {
             return None;
@@ -88,7 +88,8 @@ impl Speeds<'_> {
 mod tests {
     use super::*;
 
-    /// Speed 4 units a sample² before the moment and 2 after, with a stop of so many samples.
+    /// Acceleration of 4 units per sample² before the moment and 2 after, with a stop of `stop`
+    /// samples.
     fn position(moment: f64, stop: f64) -> Vec<f64> {
         let one = |i: i32| {
             let t = f64::from(i) - moment;

@@ -1,4 +1,4 @@
-//! The equation of motion averaged over windows, with a row for each window and a column for each term.
+//! Equation of motion averaged over windows: one row per window, one column per term.
 
 use statrs::distribution::{ContinuousCDF, Normal};
 use torqcomp_dsp::weak::{Window, white_noise_variance};
@@ -12,11 +12,11 @@ use crate::print::plural;
 
 /// Rows of the regression.
 pub(super) struct WindowRows {
-    /// Half of the window, in samples.
+    /// Half-length of the window, in samples.
     pub half: usize,
-    /// Samples from one window to the next.
+    /// Distance between windows, in samples.
     pub stride: usize,
-    /// Terms of the equation, one value for each window.
+    /// Terms of the equation, one value per window.
     pub columns: Vec<Vec<f64>>,
     /// Averaged torque or force.
     pub right: Vec<f64>,
@@ -24,7 +24,7 @@ pub(super) struct WindowRows {
     slope: Vec<f64>,
     /// Whether the body moves one way throughout a window.
     pub clean: Vec<bool>,
-    /// Order of the derivative of the motion that a column is, if its noise is known.
+    /// Derivative order of each column, if its noise is known.
     orders: Vec<Option<usize>>,
     window: Window,
     variance: f64,
@@ -36,12 +36,12 @@ pub(super) struct FittedRows {
     pub fit: Corrected,
     /// All rows.
     pub rows: WindowRows,
-    /// Rows that were fitted.
+    /// Fitted rows.
     pub used: Vec<bool>,
 }
 
 impl WindowRows {
-    /// Averages over windows of that half-length.
+    /// Averages over windows of this half-length.
     ///
     /// # Errors
     /// If too few windows fit into the record.
@@ -90,10 +90,10 @@ impl WindowRows {
     }
 
     /// The clean windows and, where the residual of the clean ones is more than noise, those others that follow the
-    /// same equation as closely. At a stop dry friction balances whatever acts, which the equation does not describe.
-    /// A reversal is located to a few hundredths of a sample at best, which may be more than the noise: such windows
-    /// would bias the result by more than the noise's uncertainty, but by no more than that is enlarged where the
-    /// model is incomplete anyway.
+    /// same equation as closely. At a stop, dry friction balances whatever acts, which the equation does not
+    /// describe. A reversal is located to a few hundredths of a sample at best, which may be more than the noise:
+    /// such windows would bias the result by more than its uncertainty due to noise, but by no more than that
+    /// uncertainty after its increase for an incomplete model.
     fn following(&self, fit: &Corrected) -> Vec<bool> {
         if fit.coloured <= COLOURED {
             return self.clean.clone();
@@ -109,7 +109,7 @@ impl WindowRows {
             .collect()
     }
 
-    /// Covariance of white noise of the motion between two columns of one row.
+    /// Covariance of white motion noise between two columns of one row.
     fn noise(&self, i: usize, j: usize) -> f64 {
         match (self.orders[i], self.orders[j]) {
             (Some(a), Some(b)) => self.variance * self.window.noise(a, b),
@@ -117,12 +117,12 @@ impl WindowRows {
         }
     }
 
-    /// Covariance of the errors of two rows `lag` windows apart, for white noise of the torque of variance 1.
+    /// Covariance of the errors of two rows `lag` windows apart, for white torque noise of variance 1.
     fn torque_errors(&self, lag: usize) -> f64 {
         self.window.noise_apart(0, 0, lag * self.stride)
     }
 
-    /// The same for noise of the motion, its terms multiplied by `factors`.
+    /// The same for motion noise, with its terms multiplied by `factors`.
     fn motion_errors(&self, lag: usize, factors: &[f64]) -> f64 {
         let mut sum = 0.0;
         for (i, a) in self.orders.iter().enumerate() {
@@ -166,11 +166,12 @@ impl WindowRows {
     }
 }
 
-/// Standard uncertainties by which a shift must differ from zero, and what it must leave of the residual at most.
+/// Minimum significant shift in standard uncertainties, and maximum fraction of the residual that may remain with
+/// it.
 const SHIFTED: (f64, f64) = (6.0, 0.85);
 
 impl FittedRows {
-    /// Seconds by which the torque is late against the motion, if that explains much of the residual:
+    /// Delay of the torque relative to the motion in seconds, if that explains much of the residual:
     /// `T(t + τ) ≈ T + τ T'`, so that τ is one more coefficient of the equation.
     pub fn shift_s(&self) -> Option<f64> {
         let rows = &self.rows;
@@ -202,13 +203,13 @@ impl FittedRows {
     }
 }
 
-/// Standard deviations beyond which half of one normal value in so many is expected (W. Chauvenet, A Manual
+/// Standard deviations beyond which half of one normal value in `count` is expected (W. Chauvenet, A Manual
 /// of Spherical and Practical Astronomy, 1863, II, 558): 3 for 185, 3.5 for 1100.
 fn chauvenet(count: usize) -> f64 {
     Normal::standard().inverse_cdf(1.0 - 0.25 / count.max(1) as f64)
 }
 
-/// Terms of the equation of motion, and which derivative of the motion each is.
+/// Terms of the equation of motion, with the order of the derivative of the motion in each.
 fn terms(
     run: &FreeRun,
     directions: &Directions,
@@ -260,7 +261,7 @@ fn integral(samples: &[f64], rate_hz: f64) -> Vec<f64> {
 }
 
 /// Half-length of the first window at which the result changes least: shorter ones are noisy, longer ones average over
-/// what the equation does not describe. Always found with one viscous friction.
+/// deviations from the equation. Always determined with one viscous friction.
 pub(super) fn plateau(run: &FreeRun, directions: &Directions) -> usize {
     let longest = (run.motion.len() / (LEAST_WINDOWS / 2 + 2)).max(SHORTEST_HALF);
     let mut halves = Vec::new();
@@ -286,11 +287,11 @@ pub(super) fn plateau(run: &FreeRun, directions: &Directions) -> usize {
     halves.get(best).copied().unwrap_or(SHORTEST_HALF)
 }
 
-/// What is kept of a fit to compare the next one with.
+/// The part of a fit needed for comparison with the next one.
 struct Tried {
     columns: Vec<Vec<f64>>,
     values: Vec<f64>,
-    /// Norm of the right side.
+    /// Norm of the right-hand side.
     right: f64,
 }
 
@@ -304,7 +305,8 @@ impl Tried {
         }
     }
 
-    /// Change of the left side from these parameters to those of another fit, over the right side.
+    /// Change of the left-hand side from these parameters to those of another fit, relative to the
+    /// right-hand side.
     fn change_to(&self, other: &Self) -> f64 {
         let pairs = other.values.iter().zip(&self.values);
         let change: Vec<f64> = pairs.map(|(a, b)| a - b).collect();

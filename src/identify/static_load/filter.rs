@@ -1,34 +1,34 @@
-//! Whitening of rows whose errors have levels in common: the covariance form of Kalman's filter with a triangular square root.
+//! Whitening of rows with shared levels in their errors: square-root form of the Kalman filter with a triangular root.
 //!
-//! A level is the drift of the zero, the zero of a series or the sensitivity of a mounting; a row sees each with a factor.
-//! The root S of the covariance S Sᵀ of the levels is updated by Givens rotations, so the time per row grows with the square
-//! of the levels that are open. (N. A. Carlson, AIAA Journal 11 (1973), 1259; P. Kaminski, A. Bryson, S. Schmidt, IEEE
-//! Trans. Automatic Control 16 (1971), 727.)
+//! A level is the drift of the zero, the zero of a series or the sensitivity of a mounting; each row depends on it with
+//! a factor. The root S of the covariance S Sᵀ of the levels is updated by Givens rotations, so the time per row grows
+//! with the square of the number of open levels. (N. A. Carlson, AIAA Journal 11 (1973), 1259; P. Kaminski, A. Bryson,
+//! S. Schmidt, IEEE Trans. Automatic Control 16 (1971), 727.)
 
-/// The levels known from the rows so far.
+/// State of the levels given the rows so far.
 pub(super) struct LevelFilter {
     /// Row k of the root, up to the diagonal.
     root: Vec<Vec<f64>>,
     /// Estimate of each level, for each column.
     levels: Vec<Vec<f64>>,
     columns: usize,
-    /// Of the rotations.
+    /// Buffer for the rotations.
     scratch: Vec<f64>,
 }
 
-/// Turns two numbers by an angle with this cosine and sine.
+/// Rotates two numbers by an angle with this cosine and sine.
 fn rotate((c, s): (f64, f64), a: &mut f64, b: &mut f64) {
     (*a, *b) = (c * *a + s * *b, c * *b - s * *a);
 }
 
-/// Cosine and sine of the angle that turns (a, b) into (r, 0), and r; `None` if b is 0.
+/// Cosine and sine of the angle that rotates (a, b) into (r, 0), and r; `None` if b is 0.
 fn rotation(a: f64, b: f64) -> Option<((f64, f64), f64)> {
     let r = (a * a + b * b).sqrt();
     (b != 0.0 && r > 0.0).then(|| ((a / r, b / r), r))
 }
 
 impl LevelFilter {
-    /// A filter of rows with so many columns, without levels.
+    /// A filter for rows of `columns` values, without levels.
     pub fn new(columns: usize) -> Self {
         Self {
             root: Vec::new(),
@@ -38,7 +38,7 @@ impl LevelFilter {
         }
     }
 
-    /// Adds a level with the mean 0 and this standard deviation.
+    /// Adds a level with mean 0 and this standard deviation.
     pub fn open(&mut self, std: f64) {
         let mut row = vec![0.0; self.root.len()];
         row.push(std);
@@ -50,7 +50,7 @@ impl LevelFilter {
     pub fn close(&mut self, place: usize) {
         self.levels.remove(place);
         self.root.remove(place);
-        // The rows below now reach beyond the diagonal by one.
+        // The rows below now extend one beyond the diagonal.
         for k in place..self.root.len() {
             if let Some((angle, _)) = rotation(self.root[k][k], self.root[k][k + 1]) {
                 for row in &mut self.root[k..] {
@@ -62,7 +62,7 @@ impl LevelFilter {
         }
     }
 
-    /// Lets the first level take an independent step with this standard deviation.
+    /// Adds an independent random step with this standard deviation to the first level.
     pub fn step(&mut self, std: f64) {
         let more = &mut self.scratch;
         more.clear();
@@ -78,8 +78,8 @@ impl LevelFilter {
         }
     }
 
-    /// Replaces the values of a row, which sees the levels with these factors, by those beyond what the rows before give,
-    /// over their standard deviation; returns this deviation.
+    /// Replaces the values of a row, which depends on the levels with these factors, by their innovations over their
+    /// standard deviation; returns that deviation.
     pub fn whiten(&mut self, factors: &[f64], own_std: f64, values: &mut [f64]) -> f64 {
         let gains = &mut self.scratch;
         gains.clear();

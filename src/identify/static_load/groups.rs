@@ -1,19 +1,19 @@
-//! Series and mountings of a table: groups of rows with a deviation in common.
+//! Series and mountings of a table: groups of rows with a common deviation.
 
 use std::collections::HashMap;
 
 use super::Point;
 use crate::failure::{ErrorCode, Failure};
 
-/// Most series or mountings that have begun and not ended at any row.
+/// Maximum number of series or mountings open at any row.
 const MOST_OPEN: usize = 100;
 
 /// Groups of rows.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Groups {
-    /// Number of the group of each row.
+    /// Group index of each row.
     pub of_row: Vec<usize>,
-    /// First and last row of each group; empty if there is only one group, whose deviation is not a deviation.
+    /// First and last row of each group; empty for a single group, whose deviation cannot be separated.
     pub ranges: Vec<[usize; 2]>,
 }
 
@@ -36,12 +36,12 @@ impl Groups {
         groups
     }
 
-    /// Number of groups; 0 if there is only one.
+    /// Number of groups; 0 for a single one.
     pub fn count(&self) -> usize {
         self.ranges.len()
     }
 
-    /// Largest number of groups that have begun and not ended at any row.
+    /// Largest number of groups open at any row.
     fn most_open(&self) -> usize {
         let mut changes: Vec<(usize, isize)> = Vec::with_capacity(2 * self.count());
         for [first, last] in &self.ranges {
@@ -57,10 +57,11 @@ impl Groups {
     }
 }
 
-/// Refuses tables whose series or mountings are mixed: the time taken grows with the square of those begun and not ended.
+/// Rejects tables with interleaved series or mountings: the computing time grows with the square of the number open at
+/// once.
 ///
 /// # Errors
-/// If too many are.
+/// If too many are open at once.
 pub(super) fn refuse_mixed(points: &[Point]) -> Result<(), Failure> {
     let columns = [
         ("series", Groups::of(points.iter().map(|p| p.series))),

@@ -1,8 +1,8 @@
-//! Whether a straight line describes the readings.
+//! Test of linearity of the readings.
 //!
-//! The means of the readings at each load are compared with the curve, and with the scatter about these means: a load is
-//! applied again with that error, whatever the characteristic is (lack of fit; N. R. Draper, H. Smith, Applied Regression
-//! Analysis, 3rd ed., 1998, 2.1).
+//! The mean readings at each load are compared with the curve and with the scatter about these means: repeating a load
+//! has that error, whatever the characteristic (lack of fit; N. R. Draper, H. Smith, Applied Regression Analysis, 3rd
+//! ed., 1998, 2.1).
 
 use super::steps::LoadSteps;
 use super::{NONE, Point, SAME, value_of};
@@ -11,21 +11,23 @@ use crate::identify::{Identification, rms};
 use crate::print::rounded;
 use torqcomp_dsp::sort_by_number;
 
-/// Distance of the means from the curve over what their scatter explains, and over the deflection at the largest load, from
-/// which there is a warning.
+/// Distance of the means from the curve, relative to what their scatter explains and to the deflection at the largest
+/// load, above which a warning is given.
 const OFF: (f64, f64) = (5.0, 1e-3);
-/// Step of the mean between the two largest loads, over that of the curve, below which the reading stands.
+/// Step of the mean between the two largest loads, relative to that of the curve, below which the reading
+/// saturates.
 const STANDS: f64 = 0.2;
-/// Fewest loads.
+/// Minimum number of loads.
 const LEAST: usize = 3;
 
-/// Error of two ranges over that of one, up to which there are two, and the least change of the sensitivity between them.
+/// Ratio of the error with two ranges to that with one, up to which there are two, and minimum change of the
+/// sensitivity between them.
 const TWO_RANGES: f64 = 0.1;
 const LEAST_CHANGE: f64 = 0.02;
-/// Fewest loads of a range.
+/// Minimum number of loads in a range.
 const FEWEST: usize = 2;
 
-/// Refuses readings whose sensitivity jumps from one load to the next: each range of an amplifier has its own.
+/// Rejects readings whose sensitivity jumps from one load to the next: each range of an amplifier has its own.
 ///
 /// # Errors
 /// If it does.
@@ -37,7 +39,7 @@ pub(super) fn refuse_two_ranges(points: &[Point], steps: &LoadSteps) -> Result<(
         return Ok(());
     }
     let zero = empty.iter().map(|p| p.reading).sum::<f64>() / empty.len() as f64;
-    // The sensitivity from that zero on, and the sum of squares that it leaves.
+    // The sensitivity from that zero on, and the residual sum of squares.
     let through_zero = |of: &[&Point]| {
         let squares: f64 = of.iter().map(|p| p.load * p.load).sum();
         let products: f64 = of.iter().map(|p| p.load * (p.reading - zero)).sum();
@@ -80,7 +82,7 @@ pub(super) fn refuse_two_ranges(points: &[Point], steps: &LoadSteps) -> Result<(
     ))
 }
 
-/// Warns about readings that a curve of this degree does not follow.
+/// Warns about readings that deviate from a curve of this degree.
 pub(super) fn warn(
     result: &mut Identification,
     points: &[Point],
@@ -131,7 +133,7 @@ pub(super) fn warn(
     );
 }
 
-/// The load from which the reading hardly rises up to the largest one, if it does not; `means` are those of the residual.
+/// The load above which the reading hardly rises, if it saturates; `means` are those of the residual.
 fn limit(means: &[f64], curve: &[f64], steps: &LoadSteps) -> Option<f64> {
     let loads = &steps.loads;
     let rises = |from: usize, to: usize| {

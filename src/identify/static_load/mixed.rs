@@ -1,21 +1,22 @@
-//! Regression of readings on loads where errors are not independent: a mixed linear model.
+//! Regression of readings on loads with correlated errors: a linear mixed model.
 //!
 //! ```text
 //! y_i = Σ_k c_k x_i^k + d i ± g_j + a_s + b_p x_i + w_i + e_i
 //! ```
 //!
-//! x: load over the largest; c: the curve; d: even drift of the zero over the rows i; g_j: half the width of the hysteresis
-//! at load step j, or in range j of the load if there are many steps, plus in loading, minus in unloading; a_s: zero of series s; b_p: deviation of the sensitivity at
-//! mounting p; w: uneven drift of the zero, a random walk over the rows; e: independent errors of the readings. d and g are
-//! estimated where they are significant; a, b and the steps of w are normal with variances that maximise the restricted
-//! likelihood. (H. D. Patterson, R. Thompson, Biometrika 58 (1971), 545; C. R. Henderson, Biometrics 31 (1975), 423.)
+//! x: load over the largest; c: the curve; d: linear drift of the zero over the rows i; g_j: half the width of the
+//! hysteresis at load step j, or in range j of the load if there are many steps, plus in loading, minus in unloading;
+//! a_s: zero of series s; b_p: deviation of the sensitivity at mounting p; w: random drift of the zero, a random walk
+//! over the rows; e: independent errors of the readings. d and g are estimated where they are significant; a, b and the
+//! steps of w are normal with variances that maximise the restricted likelihood. (H. D. Patterson, R. Thompson,
+//! Biometrika 58 (1971), 545; C. R. Henderson, Biometrics 31 (1975), 423.)
 //!
-//! An estimate whose variance comes from few series follows Student's distribution, with the degrees of freedom of Welch
-//! and Satterthwaite; its standard uncertainty is enlarged so that ±1.96 of it include 95 %. The sensitivity over m
+//! An estimate whose variance comes from few series follows Student's distribution, with the degrees of freedom of
+//! Welch and Satterthwaite; its standard uncertainty is enlarged so that ±1.96 of it cover 95 %. The sensitivity over m
 //! mountings has the uncertainty of the mean of m sensitivities, with m − 1 degrees of freedom.
 //!
-//! Readings are rounded to their last digit d: however small the residual, e is taken as no smaller than d/√12, unless
-//! the readings come with uncertainties of their own (JCGM 100:2008, F.2.2.1).
+//! Readings are rounded to their last digit d: however small the residual, e is at least d/√12, unless the readings
+//! have given uncertainties (JCGM 100:2008, F.2.2.1).
 
 use std::collections::BTreeMap;
 
@@ -29,54 +30,55 @@ use crate::student::student;
 
 /// Significance level of the hysteresis.
 const CHANCE: f64 = 0.01;
-/// Ratio of variances beyond which it is taken as this, as its products would not be numbers.
+/// Upper limit of variance ratios, to avoid overflow of their products.
 const LARGEST_RATIO: f64 = 1e100;
-/// Part of a column, in its sum of squares, that other columns may not explain.
+/// Minimum fraction of a column's sum of squares not explained by other columns.
 const APART: f64 = 0.05;
-/// Fewest degrees of freedom that the hysteresis leaves.
+/// Minimum degrees of freedom that must remain with the hysteresis.
 const LEAST_FREEDOM: usize = 3;
-/// Most steps with a hysteresis of their own: the time of a fit grows with their square. Beyond, ranges of the load have one.
+/// Maximum number of steps with their own hysteresis, as the time of a fit grows with their square; with more, ranges
+/// of the load share one.
 const MOST_LOOPS: usize = 32;
-/// Variances, over that of a reading, that are tried first: powers of 10 from and to, in steps of a half.
+/// Variance ratios to the readings tried first: exponents of 10, in steps of a half.
 const TRIED: (i32, i32) = (-6, 16);
 /// Rounds over all variances, and halvings of the step after the first rounds.
 const ROUNDS: (usize, usize) = (3, 6);
-/// Residual over the readings below which it is rounding.
+/// Relative residual below which it is rounding.
 const ROUNDING: f64 = 1e-12;
 
 /// The fitted curve.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LoadCurve {
-    /// Coefficients over powers of the load over the largest.
+    /// Coefficients of powers of the normalised load.
     pub values: Vec<f64>,
     /// Their standard uncertainties; `None` without degrees of freedom.
     pub std: Vec<Option<f64>>,
-    /// Readings less coefficients of the curve.
+    /// Number of readings minus coefficients of the curve.
     pub degrees_of_freedom: usize,
     /// Standard deviations of the random parts, in units of the reading.
     pub spreads: Spreads,
     /// Last digit of the readings, if the uncertainties come from it; otherwise 0.
     pub resolution: f64,
-    /// Scatter of the readings over their known standard uncertainties, if these are given.
+    /// Scatter of the readings relative to their given standard uncertainties, if any.
     pub scatter_over_known: Option<f64>,
-    /// Whether an even drift of the zero is part of the model.
+    /// Whether the model includes a linear drift of the zero.
     pub has_even_drift: bool,
-    /// Whether a hysteresis is part of the model.
+    /// Whether the model includes hysteresis.
     pub has_hysteresis: bool,
 }
 
 /// Standard deviations of the random parts, in units of the reading.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Spreads {
-    /// Drift of the zero from one row to the next.
+    /// Drift of the zero between rows.
     pub drift: f64,
-    /// Zero of the series.
+    /// Zero between series.
     pub zero: f64,
-    /// Deflection at the largest load, of the mountings.
+    /// Deflection at the largest load between mountings.
     pub sensitivity: f64,
 }
 
-/// Fits a curve of that degree over the load steps.
+/// Fits a curve of this degree to the load steps.
 ///
 /// # Errors
 /// [`FitError`] if there are fewer points than coefficients, or the loads do not determine them.
@@ -126,8 +128,8 @@ pub(super) fn fit(
     })
 }
 
-/// Standard uncertainty of the mean sensitivity from its scatter over the mountings; `None` if there is one mounting, or
-/// one with too few points.
+/// Standard uncertainty of the mean sensitivity from its scatter between mountings; `None` for one mounting, or one
+/// with too few points.
 fn over_mountings(
     points: &[Point],
     degree: usize,
@@ -154,13 +156,13 @@ fn over_mountings(
     Some((squares / freedom / count).sqrt() * student(freedom))
 }
 
-/// Smallest digits that are looked for, as powers of 10, and part of one that rounding in memory may be.
+/// Range of last digits considered, as powers of 10, and relative rounding error of numbers in memory.
 const DIGITS: (i32, i32) = (-12, 6);
 const OF_DIGIT: f64 = 1e-4;
 
-/// The last digit of readings: the largest power of 10 that all are multiples of; `None` if they have more digits than
-/// their display could show. The steps of a converter are another thing (`torqcomp_dsp::quality::quantisation`): any
-/// number, about any offset, seen in hundreds of samples, where a display counts in powers of 10 from zero and is read
+/// Last digit of readings: the largest power of 10 of which all are multiples; `None` if they have more digits than a
+/// display. The quantisation of a converter is a different matter (`torqcomp_dsp::quality::quantisation`): any step
+/// with any offset, detected from hundreds of samples, while a display counts in powers of 10 from zero and is read
 /// five times.
 fn resolution(readings: &[f64]) -> Option<f64> {
     let is_multiple = |digit: f64| {
@@ -212,7 +214,8 @@ fn ranges_of_load(steps: &LoadSteps) -> Vec<Vec<usize>> {
 }
 
 impl Mixed {
-    /// Whether a column differs enough from those of the model for its coefficient to be identifiable.
+    /// Whether a column is sufficiently independent of those of the model for its coefficient to be
+    /// identifiable.
     fn is_apart(&self, column: &[f64]) -> bool {
         let of_column = Self {
             readings: column.to_vec(),
@@ -230,7 +233,8 @@ impl Mixed {
             .is_some_and(|left| left > APART * all)
     }
 
-    /// Whether this model's additional columns are significant beside another, with these variances.
+    /// Whether this model's additional columns are significant compared with another, with these
+    /// variances.
     fn is_better(&self, other: &Self, ratios: VarianceRatios) -> bool {
         if self.freedom() < LEAST_FREEDOM {
             return false;
@@ -317,7 +321,7 @@ impl Mixed {
         }
     }
 
-    /// The variances with the largest restricted likelihood: a search over each in turn, in finer and finer steps.
+    /// The variances that maximise the restricted likelihood, by coordinate search with decreasing steps.
     fn best_ratios(&self) -> VarianceRatios {
         let mut best = [0.0; 3];
         let Some(plain) = self.solve(best) else {
@@ -346,7 +350,8 @@ impl Mixed {
                 *best = next;
             }
         };
-        // Where nothing has changed since a variance was last searched, nothing better is found.
+        // If nothing has changed since a variance was last searched, the search would find nothing
+        // better.
         let mut searched = [None; 3];
         for _ in 0..ROUNDS.0 {
             for place in (0..3).filter(|p| is_open[*p]) {

@@ -27,9 +27,9 @@ pub struct Point {
     pub load: f64,
     /// Reading in SI units.
     pub reading: f64,
-    /// Standard uncertainty of the reading, if it is known.
+    /// Standard uncertainty of the reading, if known.
     pub std: Option<f64>,
-    /// Number of the series it belongs to.
+    /// Number of its series.
     pub series: usize,
     /// Mounting position of the series.
     pub position: usize,
@@ -51,7 +51,7 @@ pub struct CalibrationStep {
     pub load: f64,
     /// Mean reading.
     pub reading: f64,
-    /// Standard uncertainty of the load by the scatter of the readings.
+    /// Standard uncertainty of the load from the scatter of the readings.
     pub load_std: f64,
 }
 
@@ -66,12 +66,12 @@ pub struct Term {
     pub percent: Option<f64>,
 }
 
-/// Distance of loads that count as one step, over the largest load.
+/// Relative difference of loads, in terms of the largest, up to which they count as one step.
 const SAME: f64 = 2e-3;
-/// Load that counts as none, over the largest load.
+/// Load that counts as zero, relative to the largest.
 const NONE: f64 = 1e-3;
 
-/// Number of the series of each point, for tables that do not number them: a series ends with the return to no load.
+/// Series number of each point, for tables without them: a series ends with the return to no load.
 #[must_use]
 pub fn series_of(loads: &[f64]) -> Vec<usize> {
     let largest = loads.iter().fold(0.0_f64, |m, l| m.max(l.abs()));
@@ -92,10 +92,10 @@ pub fn series_of(loads: &[f64]) -> Vec<usize> {
     numbers
 }
 
-/// Fewest rows of one load and no load.
+/// Minimum number of rows for a single load and no load.
 const ONE_WEIGHT: usize = 5;
 
-/// Evaluates the points with a curve of that degree, 1 or 3.
+/// Evaluates the points with a curve of degree 1 or 3.
 ///
 /// # Errors
 /// If there are too few loads for the degree, or the reading does not change.
@@ -159,10 +159,11 @@ pub fn identify(
     Ok(result)
 }
 
-/// Scatter of the readings over their given uncertainty below, or above, which these are doubtful.
+/// Limits of the ratio of the readings' scatter to their given uncertainty beyond which that is
+/// doubtful.
 const CONTRADICTED: (f64, f64) = (0.1, 3.0);
 
-/// Warns about uncertainties of readings that their scatter contradicts.
+/// Warns about uncertainties of readings contradicted by their scatter.
 fn contradicted(result: &mut Identification, fit: &LoadCurve) {
     let doubtful = |ratio: &f64| *ratio < CONTRADICTED.0 || *ratio > CONTRADICTED.1;
     if let Some(ratio) = fit.scatter_over_known.filter(doubtful) {
@@ -177,13 +178,13 @@ fn contradicted(result: &mut Identification, fit: &LoadCurve) {
     }
 }
 
-/// Standard uncertainties by which the sensitivity must differ from zero.
+/// Minimum distance of the sensitivity from zero, in standard uncertainties.
 const FOLLOWS: f64 = 3.0;
 
-/// Refuses readings that do not follow the loads.
+/// Rejects readings that do not follow the loads.
 fn follows(points: &[Point], fit: &LoadCurve, largest: f64) -> Result<(), Failure> {
     let (slope, std) = (fit.values[1].abs(), fit.std[1].unwrap_or(0.0));
-    // Of the readings' rounding in memory.
+    // Rounding of the readings in memory.
     let size = points.iter().fold(0.0_f64, |m, p| m.max(p.reading.abs()));
     if slope > FOLLOWS * std && slope > 1e-12 * size {
         return Ok(());
@@ -210,10 +211,10 @@ fn follows(points: &[Point], fit: &LoadCurve, largest: f64) -> Result<(), Failur
     ))
 }
 
-/// Correlation of loads and readings without signs above which the signs are at fault.
+/// Correlation of the magnitudes of loads and readings above which wrong signs are suspected.
 const ALIKE: f64 = 0.9;
 
-/// Coefficient of correlation of pairs.
+/// Correlation coefficient of pairs.
 fn correlation(pairs: &[(f64, f64)]) -> f64 {
     let count = pairs.len() as f64;
     let sum = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>();
@@ -222,7 +223,7 @@ fn correlation(pairs: &[(f64, f64)]) -> f64 {
     products / (sum(&|p| (p.0 - x).powi(2)) * sum(&|p| (p.1 - y).powi(2))).sqrt()
 }
 
-/// Mean reading at each load, and the standard uncertainty of the load that the readings' scatter gives it.
+/// Mean reading at each load, and the standard uncertainty of the load from the readings' scatter.
 fn calibration_points(
     points: &[Point],
     steps: &LoadSteps,
@@ -249,7 +250,7 @@ fn calibration_points(
     steps.iter().map(step).collect()
 }
 
-/// The unweighted residual, over the swing of the readings.
+/// The unweighted residual, relative to the range of the readings.
 fn quality(curve: &[f64], points: &[Point], units: &LoadUnits) -> FitQuality {
     let left = points.iter().map(|p| p.reading - value_of(curve, p.load));
     let left: Vec<f64> = left.collect();
@@ -261,13 +262,13 @@ fn quality(curve: &[f64], points: &[Point], units: &LoadUnits) -> FitQuality {
     }
 }
 
-/// Reading at a load, by the coefficients of its powers.
+/// Reading at a load, from the polynomial coefficients.
 fn value_of(curve: &[f64], load: f64) -> f64 {
     let power = |(k, c): (usize, &f64)| c * load.powi(k as i32);
     curve.iter().enumerate().map(power).sum()
 }
 
-/// Says what was fitted, and what the uncertainties allow for.
+/// Describes the fit, and what the uncertainties allow for.
 fn method(result: &mut Identification, fit: &LoadCurve, points: &[Point], unit: &str) {
     let is_weighted = points.iter().all(|p| p.std.is_some());
     result.method.push(format!(
@@ -337,7 +338,7 @@ fn constants(fit: &LoadCurve, largest: f64, units: &LoadUnits) -> Vec<NamedEstim
     found
 }
 
-/// Readings with the curve through them, and the residual.
+/// Readings with the fitted curve, and the residual.
 fn draw(result: &mut Identification, points: &[Point], curve: &[f64], units: &LoadUnits) {
     let mut points = points.to_vec();
     sort_by_number(&mut points, |point| point.load);
@@ -358,7 +359,7 @@ fn draw(result: &mut Identification, points: &[Point], curve: &[f64], units: &Lo
     ]);
 }
 
-/// Residual of a calibration, over the swing of the readings, above which the fit is poor.
+/// Residual of a calibration, relative to the range of the readings, above which the fit is poor.
 const POOR: f64 = 0.05;
 
 fn poor(result: &mut Identification, relative: f64) {
@@ -374,7 +375,7 @@ fn poor(result: &mut Identification, relative: f64) {
     }
 }
 
-/// Warns about terms that the record cannot show, and the validity of the constants.
+/// Warns about unidentifiable terms, and the validity of the constants.
 fn warnings(result: &mut Identification, points: &[Point], (degree, steps): (usize, &LoadSteps)) {
     if points.iter().all(|p| p.series == 0) {
         let has_empty = points.iter().any(|p| p.load.abs() <= NONE * steps.largest);
@@ -422,7 +423,7 @@ mod tests {
             .collect()
     }
 
-    /// Two series, worked by hand: 10 N m give 1.00 and 1.02 V going up, 1.04 V coming down.
+    /// Two series with known results: 10 N m give 1.00 and 1.02 V going up, 1.04 V coming down.
     const ROWS: [(f64, f64); 10] = [
         (0.0, 0.00),
         (5.0, 0.50),

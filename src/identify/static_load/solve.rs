@@ -1,4 +1,4 @@
-//! The mixed model solved for given variances, in a time that grows in proportion to the rows.
+//! Solution of the mixed model for given variances, in time proportional to the number of rows.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,15 +6,15 @@ use super::Point;
 use super::filter::LevelFilter;
 use super::groups::Groups;
 
-/// Variances of drift, zeros and sensitivities, over that of a reading.
+/// Variances of drift, zeros and sensitivities, relative to that of a reading.
 pub(super) type VarianceRatios = [f64; 3];
 
-/// The model: readings, what is estimated of them, and which errors they have in common.
+/// The model: readings, fixed effects, and shared errors.
 pub(super) struct Mixed {
     pub readings: Vec<f64>,
-    /// Columns whose coefficients are estimated: the curve, then even drift and hysteresis.
+    /// Columns of the fixed effects: the curve, then linear drift and hysteresis.
     pub fixed: Vec<Vec<f64>>,
-    /// Load over the largest.
+    /// Normalised load.
     pub loads: Vec<f64>,
     pub series: Groups,
     pub mountings: Groups,
@@ -30,7 +30,7 @@ pub(super) struct SolvedLoads {
     pub deviance: f64,
     pub values: DVector<f64>,
     pub covariance: DMatrix<f64>,
-    /// Estimated variance of a reading, over the known one.
+    /// Estimated variance of a reading, relative to the known one.
     pub variance: f64,
 }
 
@@ -43,7 +43,7 @@ enum Level {
 }
 
 impl Mixed {
-    /// The model of these points with more columns beside the curve.
+    /// The model of these points with additional columns.
     pub fn of(points: &[Point], degree: usize, largest: f64, more: &[Vec<f64>]) -> Self {
         let loads: Vec<f64> = points.iter().map(|p| p.load / largest).collect();
         let power = |k: usize| loads.iter().map(|load| load.powi(k as i32)).collect();
@@ -62,7 +62,7 @@ impl Mixed {
         }
     }
 
-    /// Rows less estimated coefficients.
+    /// Number of rows minus estimated coefficients.
     pub fn freedom(&self) -> usize {
         self.readings.len().saturating_sub(self.fixed.len())
     }
@@ -78,7 +78,7 @@ impl Mixed {
         let mut equations = vec![0.0; fixed * fixed];
         let mut products = DVector::zeros(fixed);
         for row in rows() {
-            // Half of the symmetric matrix is all that its Cholesky factor needs.
+            // Half of the symmetric matrix suffices for its Cholesky factor.
             for (j, column) in equations.chunks_exact_mut(fixed).enumerate() {
                 add(&mut column[j..], row[j], &row[j..fixed]);
             }
@@ -90,8 +90,8 @@ impl Mixed {
             let pairs = row.iter().zip(values.iter());
             row[fixed] - pairs.map(|(x, c)| x * c).sum::<f64>()
         };
-        // What is left is summed, as a difference of sums would be that of rounding beside a large zero; so is its share in
-        // the solution, solved for once more.
+        // The residuals are summed directly, as a difference of sums would be dominated by rounding for a large zero;
+        // one step of iterative refinement likewise corrects the solution.
         let mut correction = DVector::zeros(fixed);
         for row in rows() {
             add(correction.as_mut_slice(), rest(&values, row), &row[..fixed]);
@@ -113,8 +113,8 @@ impl Mixed {
         })
     }
 
-    /// Rows of the columns and the reading, made independent with variance 1, one after the other; ln of the determinant of
-    /// their covariance.
+    /// Rows of the columns and the reading, whitened one after the other; also ln of the determinant of their
+    /// covariance.
     fn whitened(&self, ratios: VarianceRatios) -> (Vec<f64>, f64) {
         let [drift, zeros, sensitivities] = ratios.map(f64::sqrt);
         let width = self.fixed.len() + 1;
@@ -155,7 +155,7 @@ impl Mixed {
             all.push(self.readings[i]);
             let total = filter.whiten(&factors, own.sqrt(), &mut all[start..]);
             logarithm += 2.0 * total.ln();
-            // From the last on, so that the places of those before stay.
+            // Backwards, so that the indices of the preceding ones remain valid.
             for place in (0..open.len()).rev() {
                 if self.ends(open[place], i) {
                     filter.close(place);
@@ -166,7 +166,7 @@ impl Mixed {
         (all, logarithm)
     }
 
-    /// Whether no row after this one sees the level.
+    /// Whether no later row depends on the level.
     fn ends(&self, level: Level, row: usize) -> bool {
         match level {
             Level::Drift => false,
@@ -176,7 +176,7 @@ impl Mixed {
     }
 }
 
-/// Adds a multiple of numbers to sums.
+/// Adds a multiple of values to sums.
 fn add(sums: &mut [f64], factor: f64, values: &[f64]) {
     for (sum, value) in sums.iter_mut().zip(values) {
         *sum += factor * value;

@@ -1,6 +1,6 @@
 use super::*;
 
-/// Henderson's equations with dense columns, the whole covariance of the drift written out.
+/// Henderson's equations with dense columns and the full covariance of the drift.
 fn dense(model: &Mixed, [drift, zeros, sensitivities]: VarianceRatios) -> SolvedLoads {
     let count = model.readings.len();
     let covariance = DMatrix::from_fn(count, count, |i, j| {
@@ -48,7 +48,7 @@ fn noise(state: &mut u64) -> f64 {
     (*state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
 }
 
-/// Loops of ten rows; series and mounting of each row by its number.
+/// Loops of ten rows; series and mounting of each row by its index.
 fn table(series: impl Fn(usize) -> usize, position: impl Fn(usize) -> usize, known: bool) -> Mixed {
     let mut state = 3;
     let point = |i: usize| {

@@ -1,17 +1,17 @@
-//! The load steps of a table: which rows belong to each, and whether they were reached by loading or unloading.
+//! Load steps of a table: the rows of each, and whether they were reached by loading or unloading.
 
 use super::{Point, SAME};
 
 /// The different loads of a table with their rows.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LoadSteps {
-    /// The different loads, no load included, rising.
+    /// The different loads except no load, ascending.
     pub loads: Vec<f64>,
     /// Rows at each load, in the order of the table.
     pub rows: Vec<Vec<usize>>,
-    /// Whether each row was reached by raising the load (in size), not by lowering it.
+    /// Whether each row was reached by increasing the magnitude of the load.
     pub is_rising: Vec<bool>,
-    /// Largest load in size.
+    /// Largest magnitude of the loads.
     pub largest: f64,
 }
 
@@ -37,7 +37,7 @@ impl LoadSteps {
     }
 }
 
-/// Rows at each of the rising loads. A row between two loads that are hardly apart belongs to both.
+/// Rows at each of the ascending loads. A row between two loads that hardly differ belongs to both.
 fn rows_at(points: &[Point], loads: &[f64], largest: f64) -> Vec<Vec<usize>> {
     let mut rows = vec![Vec::new(); loads.len()];
     let is_at = |point: &Point, load: f64| (point.load - load).abs() <= SAME * largest;
@@ -52,11 +52,11 @@ fn rows_at(points: &[Point], loads: &[f64], largest: f64) -> Vec<Vec<usize>> {
     rows
 }
 
-/// Whether the load (in size) was raised to each point of its series, not lowered. A load that returns by less than the
-/// distance of two steps has not turned: repeated rows at one load have the direction of the first of them.
+/// Whether the magnitude of the load was increased to reach each point of its series. A return by less than the
+/// distance of two steps is not a reversal: repeated rows at one load have the direction of the first of them.
 fn directions(points: &[Point], largest: f64) -> Vec<bool> {
     let series = points.iter().map(|p| p.series + 1).max().unwrap_or(0);
-    // Direction, and the farthest load since it turned.
+    // Direction, and the extreme load since the last reversal.
     let mut last: Vec<Option<(bool, f64)>> = vec![None; series];
     let direction = |point: &Point| {
         let size = point.load.abs();

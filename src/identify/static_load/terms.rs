@@ -1,7 +1,7 @@
 //! Terms of the standards for force and torque calibration.
 //!
-//! X: deflection, a reading less the zero of its series; X': the same while unloading; X_a: deflection of
-//! the fitted curve; X_N: that at the largest load; i: readings.
+//! X: deflection, a reading minus the zero of its series; X': the same during unloading; X_a: deflection of the fitted
+//! curve; X_N: that at the largest load; i: readings.
 //!
 //! | term | formula | standards |
 //! |---|---|---|
@@ -12,8 +12,8 @@
 //! | zero return | `\|i_after − i_before\|/X_N` | ISO 376 f_0, DIN 51309 f_0, VDI/VDE 2646 f_0 |
 //! | creep | `\|i_last − i_first\|/X_N`, largest load held | ISO 376 c (readings 30 s and 300 s after loading) |
 //!
-//! The largest value of each over loads or series, in per cent. ISO 376:2011 fits X_a to loading alone; here
-//! it is the curve through loading and unloading, as in case II of DIN 51309:2005.
+//! The largest value of each over loads or series, in per cent. ISO 376:2011 fits X_a to loading only; here it is the
+//! curve through loading and unloading, as in case II of DIN 51309:2005.
 
 use std::collections::{HashMap, HashSet};
 
@@ -24,7 +24,7 @@ use super::{NONE, Point, SAME, Term};
 struct Deflections<'a> {
     points: &'a [Point],
     steps: &'a LoadSteps,
-    /// Reading of the empty stand before each series, or the zero of the curve.
+    /// Reading without load before each series, or the zero of the curve.
     zeros: Vec<f64>,
 }
 
@@ -32,7 +32,7 @@ struct Deflections<'a> {
 type Rows<'a> = &'a [usize];
 
 impl Deflections<'_> {
-    /// Series and deflection of each of these rows, those of loading (`up`) or unloading, in the wanted series.
+    /// Series and deflection of each of these rows, for loading (`up`) or unloading, in the wanted series.
     fn at(&self, rows: Rows, up: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<(usize, f64)> {
         rows.iter()
             .filter(|i| self.steps.is_rising[**i] == up && wanted(self.points[**i].series))
@@ -43,7 +43,7 @@ impl Deflections<'_> {
             .collect()
     }
 
-    /// The same with one value for each series: the mean if the load was applied repeatedly.
+    /// The same with one value per series: the mean if the load was applied repeatedly.
     fn by_series(&self, rows: Rows, up: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<(usize, f64)> {
         let all = self.at(rows, up, wanted);
         let of = |part: &[(usize, f64)]| {
@@ -159,7 +159,7 @@ const NAMES: [(&str, &str); 6] = [
     ),
 ];
 
-/// Readings of the empty stand before and after each series.
+/// Readings without load before and after each series.
 fn zeros(points: &[Point], largest: f64) -> Vec<(Option<f64>, Option<f64>)> {
     let count = points.iter().map(|p| p.series).max().map_or(0, |m| m + 1);
     let mut of: Vec<Vec<&Point>> = vec![Vec::new(); count];
@@ -189,7 +189,7 @@ fn creep(points: &[Point], largest: f64, full: f64) -> Option<f64> {
     }))
 }
 
-/// Largest less smallest over the mean, in per cent.
+/// Range over the mean, in per cent.
 fn spread(values: &[f64]) -> Option<f64> {
     let (low, high) = ends(values);
     (values.len() > 1).then(|| 100.0 * (high - low) / mean(values).abs())
@@ -207,7 +207,7 @@ fn ends(values: &[f64]) -> (f64, f64) {
         })
 }
 
-/// The largest of the known values; one over a mean of zero is not known.
+/// The largest of the known values; a ratio to a mean of zero is unknown.
 fn worst(values: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     values
         .flatten()

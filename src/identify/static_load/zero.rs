@@ -1,4 +1,4 @@
-//! What the readings without load say of the zero.
+//! Zero of the readings without load.
 
 use super::mixed::LoadCurve;
 use super::{NONE, Point};
@@ -6,8 +6,8 @@ use crate::identify::{Identification, rms};
 use crate::print::{self, rounded};
 use crate::student::student;
 
-/// Makes the uncertainty of a zero that walks from reading to reading no less than that of the mean of its readings: it is
-/// known only while it is read.
+/// Limits the uncertainty of a randomly drifting zero from below by that of the mean of its readings, as it is known
+/// only while it is read.
 pub(super) fn walking(fit: &mut LoadCurve, points: &[Point], largest: f64) {
     let Some(std) = fit.std[0].filter(|_| fit.spreads.drift > 0.0) else {
         return;
@@ -23,10 +23,10 @@ pub(super) fn walking(fit: &mut LoadCurve, points: &[Point], largest: f64) {
     fit.std[0] = Some(std.max(of_readings));
 }
 
-/// Change of the reading without load over the largest deflection from which on the zero is said to drift.
+/// Minimum reported drift of the reading without load, relative to the largest deflection.
 const DRIFTS: f64 = 5e-3;
 
-/// Warns of a zero that is another one at the end of the test.
+/// Warns about a zero that differs at the end of the test.
 pub(super) fn drifting(
     result: &mut Identification,
     fit: &LoadCurve,

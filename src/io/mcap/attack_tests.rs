@@ -1,4 +1,4 @@
-//! Attacks on files: whatever is changed, nothing is lost without a word.
+//! Corruption of files: no change may lose data silently.
 
 use mcap::records::op;
 use mcap::{Compression, WriteOptions};
@@ -8,9 +8,9 @@ use super::record::input::CountedInput;
 use super::testing::{File, drain, float64, inventory, open, options, stream};
 use super::{Inventory, TimeOptions};
 
-/// Messages of the attacked topic.
+/// Number of messages of the tested topic.
 const MESSAGES: u64 = 60;
-/// Single bits that are changed, over all files.
+/// Number of single-bit changes, over all files.
 const FLIPS: usize = 5000;
 
 /// Sixty messages of a topic among others, an attachment and metadata.
@@ -51,17 +51,17 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// Times and values, and whether anything is said to be lost.
+/// Times and values, and whether a loss is reported.
 type Found = ((Vec<i64>, Vec<f64>), bool);
 
-/// What is read of the topic, or nothing if it is refused.
+/// Content read of the topic, or `None` if it is rejected.
 fn read(bytes: &[u8]) -> Option<Found> {
     let mut reader = open(bytes, ("/torque", "data"), &TimeOptions::default()).ok()?;
     let read = drain(&mut reader);
     Some((read, reader.finish().is_lossy))
 }
 
-/// Fails if something is missing of a changed file and nothing is said.
+/// Fails if a changed file lacks data without a report.
 fn attack(bytes: &[u8], whole: &(Vec<i64>, Vec<f64>), what: &str) {
     if let Some((found, is_lossy)) = read(bytes) {
         let same = found == *whole;
@@ -97,7 +97,7 @@ fn a_file_that_is_whole_is_lossless() {
     }
 }
 
-/// Every record becomes one of each other kind: of those that there are, one that there is not, and a private one.
+/// Every record is changed to one of each other kind: existing ones, a nonexistent one, and a private one.
 #[test]
 fn a_changed_opcode_loses_nothing_in_silence() {
     for (name, bytes) in files() {
@@ -122,8 +122,8 @@ fn a_changed_opcode_loses_nothing_in_silence() {
     }
 }
 
-/// Bits all over the file, the same on every run (a linear congruence gives their places). Without checksums, a changed
-/// bit of a value cannot be told: there, only the counts are compared.
+/// Bits changed throughout the file, at reproducible places (linear congruential). Without checksums, a changed bit of
+/// a value cannot be detected, so only the counts are compared.
 #[test]
 fn a_changed_bit_loses_nothing_in_silence() {
     let mut random = 1_u64;

@@ -1,24 +1,24 @@
-//! Times of the samples in messages that hold many.
+//! Times of the samples in messages with several of them.
 
 use super::route::{Hop, Route};
 use super::schema::{FieldKind, Schema};
 use crate::failure::did_you_mean;
 
-/// How far samples within a message are apart.
+/// Spacing of the samples within a message.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Spacing {
     /// Every message holds one sample.
     Single,
-    /// A field says it: seconds per unit of the field, or its reciprocal for a rate.
+    /// Given by a field: seconds per unit of the field, or its reciprocal for a rate.
     Field {
-        /// Way to it.
+        /// Path to it.
         hops: Vec<Hop>,
         /// Seconds per unit; of the reciprocal if the field is a rate.
         seconds: f64,
         /// Whether the field is a rate.
         is_rate: bool,
     },
-    /// Samples lie evenly from one message's time to the next one's.
+    /// Samples are evenly spaced between the times of consecutive messages.
     Even,
 }
 
@@ -41,7 +41,7 @@ const NAMES: &[(&str, f64, bool)] = &[
     ("fs", 1.0, true),
 ];
 
-/// Endings of names that state the unit: ending, seconds per unit.
+/// Name endings that give the unit: ending, seconds per unit.
 const ENDINGS: &[(&str, f64)] = &[
     ("_ns", 1e-9),
     ("_nsec", 1e-9),
@@ -57,11 +57,11 @@ const ENDINGS: &[(&str, f64)] = &[
 ];
 
 impl Spacing {
-    /// Finds how far samples are apart: by the field that the user names, by one that is called
-    /// so, or evenly between messages.
+    /// Finds the spacing of samples: from the field named by the user, from one with such a name,
+    /// or evenly between messages.
     ///
     /// # Errors
-    /// A sentence if the named field is not there or its name does not tell what it is.
+    /// A sentence if the named field is missing or its name does not say what it contains.
     pub fn find(schema: &Schema, route: &Route, named: Option<&str>) -> Result<Self, String> {
         let fields = &schema.root().fields;
         if let Some(name) = named {
@@ -73,7 +73,7 @@ impl Spacing {
                     hint()
                 )
             })?;
-            // Any other name is taken for a spacing in seconds, as the user names it.
+            // Any other name given by the user is taken to be a spacing in seconds.
             let (seconds, is_rate) = meaning(name).unwrap_or((1.0, false));
             return Self::field(schema, place, seconds, is_rate)
                 .ok_or_else(|| format!("\"{name}\" is no single number"));
@@ -97,7 +97,7 @@ impl Spacing {
         })
     }
 
-    /// Way to the field, if there is one.
+    /// Path to the field, if any.
     pub fn hops(&self) -> Option<&Vec<Hop>> {
         match self {
             Self::Field { hops, .. } => Some(hops),
@@ -106,7 +106,7 @@ impl Spacing {
     }
 }
 
-/// What a field's name says it holds.
+/// Meaning of a field by its name.
 fn meaning(name: &str) -> Option<(f64, bool)> {
     let name = name.to_lowercase();
     let ending = ENDINGS
@@ -119,15 +119,15 @@ fn meaning(name: &str) -> Option<(f64, bool)> {
         .map(|(_, seconds, is_rate)| (seconds * scale, *is_rate))
 }
 
-/// Gives every sample of a message its time.
+/// Assigns a time to every sample of a message.
 #[derive(Debug)]
 pub struct Blocks {
     spacing: Spacing,
-    /// A message whose samples wait for the next message's time.
+    /// A message whose samples need the time of the next one.
     waiting: Option<(i64, Vec<f64>)>,
     /// Spacing of the last samples, in ns.
     last_ns: Option<f64>,
-    /// Messages whose spacing made no sense.
+    /// Number of messages with an invalid spacing.
     pub without_spacing: u64,
 }
 
@@ -142,7 +142,7 @@ impl Blocks {
         }
     }
 
-    /// Takes a message's samples; those whose times are known go to `each`.
+    /// Takes a message's samples; those with known times are passed to `each`.
     pub fn push(
         &mut self,
         time_ns: i64,
@@ -168,7 +168,7 @@ impl Blocks {
         }
     }
 
-    /// Gives the last message's samples, spaced as those before.
+    /// Outputs the last message's samples, with the previous spacing.
     pub fn finish(&mut self, each: impl FnMut(i64, f64)) {
         self.give_waiting(None, each);
     }

@@ -1,4 +1,4 @@
-//! Channels of a file and how their messages are read.
+//! Channels of a file and the decoding of their messages.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
@@ -10,28 +10,28 @@ use super::record;
 use super::schema::ros2msg::Generation;
 use super::schema::{Schema, json, protobuf, ros2idl, ros2msg};
 
-/// Schemas and channels as the file declares them.
+/// Schemas and channels as declared in the file.
 #[derive(Debug, Default)]
 pub struct Channels {
     schemas: BTreeMap<u16, Arc<DeclaredSchema>>,
     channels: BTreeMap<u16, Arc<TopicChannel>>,
-    /// Declarations that contradict an earlier one.
+    /// Number of declarations that contradict an earlier one.
     pub conflicts: u64,
 }
 
-/// What a channel's messages are made of.
+/// Message definition of a channel.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeclaredSchema {
     id: u16,
-    /// Name of the type, as `sensor_msgs/msg/JointState`.
+    /// Name of the type, such as `sensor_msgs/msg/JointState`.
     pub name: String,
-    /// Language of the definition, as `ros2msg`.
+    /// Language of the definition, such as `ros2msg`.
     pub encoding: String,
     data: Vec<u8>,
     parsed: Parsed,
 }
 
-/// What a definition says, read once for all the numbers that are chosen: one of a million fields takes 100 MB.
+/// The parsed definition, shared by all selected numbers: one of a million fields takes 100 MB.
 #[derive(Debug, Clone, Default)]
 struct Parsed(OnceLock<Result<Arc<Schema>, String>>);
 
@@ -47,14 +47,14 @@ impl Eq for Parsed {}
 /// A channel and its schema.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TopicChannel {
-    /// The channel as the file declares it.
+    /// The channel as declared in the file.
     pub record: records::Channel,
-    /// Its schema, if it has one.
+    /// Its schema, if any.
     pub schema: Option<Arc<DeclaredSchema>>,
 }
 
 impl Channels {
-    /// Takes note of a schema or a channel; other records are left alone.
+    /// Records a schema or a channel; other records are ignored.
     pub fn note(&mut self, op: u8, body: &[u8]) {
         // Message indexes need not be parsed.
         let is_declaration = matches!(op, op::SCHEMA | op::CHANNEL);
@@ -84,7 +84,7 @@ impl Channels {
     fn add_channel(&mut self, record: records::Channel) {
         match self.channels.get(&record.id) {
             Some(known) if known.record != record => self.conflicts += 1,
-            // Its schema may have been declared since.
+            // Its schema may have been declared in the meantime.
             Some(known) if known.schema.is_some() || record.schema_id == 0 => {}
             _ => {
                 let schema = self.schemas.get(&record.schema_id).cloned();
@@ -106,7 +106,7 @@ impl Channels {
 }
 
 impl DeclaredSchema {
-    /// What a definition in a known language says.
+    /// Parses a definition in a known language.
     fn read(&self) -> Result<Arc<Schema>, String> {
         let text = || String::from_utf8_lossy(&self.data);
         let read = match &*self.encoding {
@@ -121,10 +121,10 @@ impl DeclaredSchema {
 }
 
 impl TopicChannel {
-    /// How its messages are encoded, and what they are made of. JSON is told from a message.
+    /// Encoding and schema of its messages. For JSON, it is derived from a message.
     ///
     /// # Errors
-    /// A sentence that says why they cannot be read.
+    /// A sentence with the reason if they cannot be read.
     pub fn layout(&self, message: &[u8]) -> Result<(Encoding, Arc<Schema>), String> {
         let record = &self.record;
         if record.message_encoding == "json" {
@@ -159,7 +159,7 @@ impl TopicChannel {
         parsed.clone().map(|schema| (encoding, schema))
     }
 
-    /// Whether its messages are of the same type as those of another channel.
+    /// Whether its messages have the same type as those of another channel.
     pub(super) fn has_type_of(&self, other: &Self) -> bool {
         let what = |channel: &Self| {
             let schema = channel.schema.as_ref();
@@ -168,7 +168,7 @@ impl TopicChannel {
         self.record.message_encoding == other.record.message_encoding && what(self) == what(other)
     }
 
-    /// Name of its schema, for people.
+    /// Name of its schema, for messages.
     pub fn schema_name(&self) -> &str {
         self.schema.as_ref().map_or("", |schema| &schema.name)
     }

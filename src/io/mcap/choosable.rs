@@ -1,9 +1,9 @@
-//! Names of the numbers in a file, by which one can be chosen.
+//! Names by which the numbers in a file can be selected.
 
 use super::inventory::{ChannelReport, LeafReport};
 
 impl LeafReport {
-    /// Its path with the first item in place of lists and arrays: `poses[].c[9].x` is `poses[0].c[0].x`.
+    /// Its path with the first item instead of lists and arrays: `poses[].c[9].x` is `poses[0].c[0].x`.
     #[must_use]
     pub fn first_item(&self) -> String {
         let mut pieces = self.path.split('[');
@@ -17,8 +17,9 @@ impl LeafReport {
 }
 
 impl ChannelReport {
-    /// The numbers that a part of a name can choose, as topic and field: those of lists only by the names of their items,
-    /// since without them any item could be meant. What describes a list (`layout` of the `MultiArray` messages of ROS) is none.
+    /// The numbers that part of a name can select, as topic and field: those of lists only by the names of their items,
+    /// since otherwise any item could be meant. The description of a list (`layout` of the `MultiArray` messages of
+    /// ROS) is excluded.
     #[must_use]
     pub fn choosable(&self) -> Vec<[String; 2]> {
         let one = |leaf: &LeafReport| -> Vec<String> {

@@ -1,25 +1,25 @@
-//! The clock of the messages' own stamps beside that of the recorder.
+//! Comparison of the clock of the messages' own stamps with that of the recorder.
 
-/// Largest difference of two clocks that need no word, in ns: one day.
+/// Largest difference of two clocks without a warning, in ns: one day.
 const DAY_NS: i64 = 86_400_000_000_000;
-/// Share of the record's length by which clocks may drift apart without a word.
+/// Largest drift between the clocks without a warning, relative to the record's length.
 const DRIFT: f64 = 0.01;
 /// The same in ns.
 const DRIFT_NS: i64 = 100_000_000;
 
-/// What was seen of both clocks.
+/// Statistics of both clocks.
 #[derive(Debug, Default)]
 pub struct ClockCheck {
-    /// Stamp minus log time: of the first message, least and greatest, in ns.
+    /// Stamp minus log time in ns: of the first message, minimum and maximum.
     offsets: Option<(i64, i64, i64)>,
-    /// Log times, first and last, in ns.
+    /// First and last log time, in ns.
     log: Option<(i64, i64)>,
-    /// Stamps that are zero.
+    /// Number of zero stamps.
     zeros: u64,
 }
 
 impl ClockCheck {
-    /// Takes note of a message's two times.
+    /// Records the two times of a message.
     #[inline]
     pub fn note(&mut self, stamp_ns: Option<i64>, log_time_ns: u64) {
         let Some(stamp_ns) = stamp_ns else {
@@ -40,7 +40,7 @@ impl ClockCheck {
         });
     }
 
-    /// What should be said about them.
+    /// Warnings about the clocks.
     pub fn warnings(&self) -> Vec<String> {
         let mut said = Vec::new();
         if self.zeros > 0 {

@@ -1,4 +1,4 @@
-//! One interface to the encodings of messages.
+//! Common interface to the message encodings.
 
 use std::fmt;
 use std::sync::Arc;
@@ -15,34 +15,34 @@ use super::time::Stamp;
 use super::tree::TreeTargets;
 use crate::failure::did_you_mean;
 
-/// What is wanted of every message.
+/// What to extract from every message.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Targets {
     /// The value or values.
     pub value: Route,
     /// The time stamp within the message.
     pub stamp: Option<Stamp>,
-    /// Way to the number that says how far samples are apart.
+    /// Path to the spacing of samples.
     pub spacing: Option<Vec<Hop>>,
 }
 
-/// What a message holds of it.
+/// Values extracted from a message.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Reading {
-    /// Values in order; one unless all items of a list are wanted.
+    /// Values in order; one, unless all items of a list are wanted.
     pub values: Vec<f64>,
     /// Seconds of the stamp.
     pub seconds: Option<i64>,
     /// Nanoseconds of the stamp.
     pub nanoseconds: Option<i64>,
-    /// The number that says how far samples are apart.
+    /// Spacing of samples.
     pub spacing: Option<f64>,
-    /// Place of an item that is asked for by its name.
+    /// Index of an item requested by name.
     pub place: Option<usize>,
 }
 
 impl Reading {
-    /// Forgets the last message.
+    /// Clears the previous message.
     pub fn clear(&mut self) {
         self.values.clear();
         self.seconds = None;
@@ -59,30 +59,30 @@ impl Reading {
     }
 }
 
-/// Why a message gives no value.
+/// Reason why a message gives no value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Damage {
     /// It ends before the field.
     Short,
-    /// The list has not that many items.
+    /// The list is shorter.
     NoItem {
-        /// Item asked for.
+        /// Requested item.
         index: i64,
-        /// Items there are.
+        /// Number of items.
         count: u64,
     },
     /// No item has that name.
     NoName {
-        /// Name asked for.
+        /// Requested name.
         name: String,
-        /// Names that there are, up to [`NAMES`].
+        /// Existing names, up to [`NAMES`].
         there: Vec<String>,
     },
-    /// The message says it is encoded in a way that is not known.
+    /// Unknown encapsulation of the message.
     Encapsulation(u8),
     /// The field is not set.
     Absent,
-    /// The bytes are no message of the encoding.
+    /// The bytes are not a message in this encoding.
     Malformed(String),
 }
 
@@ -120,30 +120,29 @@ impl fmt::Display for Damage {
     }
 }
 
-/// Most names that are kept of a message, and most of them in a sentence.
+/// Maximum number of names kept from a message, and maximum in a sentence.
 pub const NAMES: usize = 256;
 const SHOWN: usize = 32;
-/// Most bytes of a name: a longer one is left out.
+/// Maximum length of a name in bytes; a longer one is ignored.
 const NAME_BYTES: usize = 200;
 
-/// A name that is looked for among those of the items of a list.
+/// A name searched for among those of the items of a list.
 #[derive(Debug, Default)]
 pub struct Names<'a> {
     wanted: &'a [u8],
-    /// Items seen so far.
+    /// Number of items seen so far.
     pub seen: usize,
-    /// Place of the first item with the name.
+    /// Index of the first item with the name.
     pub found: Option<usize>,
-    /// Names seen, where they are to be listed.
+    /// Names seen, if they are to be listed.
     there: Option<Vec<String>>,
 }
 
 impl<'a> Names<'a> {
-    /// Searches a message, which `run` goes through; a message without the name is gone through once more, to list what
-    /// there is.
+    /// Searches a message with `run`; if the name is missing, a second pass lists the existing ones.
     ///
     /// # Errors
-    /// If the message cannot be gone through, or does not hold the name.
+    /// If the message cannot be parsed, or does not contain the name.
     pub fn search(
         wanted: &'a [u8],
         mut run: impl FnMut(Self) -> Result<Self, Damage>,
@@ -164,7 +163,7 @@ impl<'a> Names<'a> {
         })
     }
 
-    /// Looks at the name of the next item.
+    /// Compares the name of the next item.
     pub fn compare(&mut self, text: &[u8]) {
         if self.found.is_none() && text == self.wanted {
             self.found = Some(self.seen);
@@ -177,7 +176,7 @@ impl<'a> Names<'a> {
     }
 }
 
-/// Encodings that can be read.
+/// Supported encodings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
     /// CDR, of ROS 2.
@@ -191,7 +190,7 @@ pub enum Encoding {
 }
 
 impl Encoding {
-    /// Reads the name that channels give.
+    /// Parses the name used by channels.
     pub fn of(name: &str) -> Option<Self> {
         match name {
             "cdr" => Some(Self::Cdr),
@@ -203,7 +202,7 @@ impl Encoding {
     }
 }
 
-/// Takes wanted numbers out of messages.
+/// Extracts wanted numbers from messages.
 pub enum Decoder {
     /// CDR and ROS 1.
     Cdr(Box<cdr::CdrDecoder>),
@@ -234,7 +233,7 @@ impl Decoder {
     /// Reads a message; `reading` is cleared first.
     ///
     /// # Errors
-    /// [`Damage`] if the message does not hold the value.
+    /// [`Damage`] if the message does not contain the value.
     pub fn read(&mut self, data: &[u8], reading: &mut Reading) -> Result<(), Damage> {
         reading.clear();
         match self {
@@ -248,10 +247,10 @@ impl Decoder {
     }
 }
 
-/// A name that no item has: asked for, all names are told.
+/// A name that no item has, to obtain a list of all names.
 const NOBODY: &str = "\0";
 
-/// Names of the items of the list that a path goes through, in a message; `None` if they have none.
+/// Names of the items of the list on a path, in a message; `None` if they have none.
 pub fn item_names(
     encoding: Encoding,
     schema: &Arc<Schema>,
@@ -263,7 +262,7 @@ pub fn item_names(
     searched(encoding, schema, &route, message)
 }
 
-/// Texts at the end of a way through a message that holds a number; `None` if it cannot be read.
+/// Texts at the end of a path in a message that contains a number; `None` if it cannot be read.
 pub fn texts(
     encoding: Encoding,
     schema: &Arc<Schema>,
@@ -280,7 +279,7 @@ pub fn texts(
     searched(encoding, schema, &route, message)
 }
 
-/// All texts among which a name is looked for in vain.
+/// All texts searched without finding a name.
 fn searched(
     encoding: Encoding,
     schema: &Arc<Schema>,
@@ -293,10 +292,10 @@ fn searched(
     }
 }
 
-/// What a message holds of a number.
+/// Values of a number in a message.
 ///
 /// # Errors
-/// [`Damage`] if it does not hold it.
+/// [`Damage`] if the message does not contain it.
 pub fn values(
     encoding: Encoding,
     schema: &Arc<Schema>,

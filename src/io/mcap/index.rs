@@ -1,4 +1,4 @@
-//! What the summary at the end of a file says of it, without reading the rest.
+//! The summary at the end of a file, read without the rest.
 
 use std::fs::File;
 use std::io::{Cursor, Read, Seek, SeekFrom};
@@ -19,9 +19,9 @@ use crate::io::storage::Stored;
 /// The end of a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SignalEnd {
-    /// Time of its last sample, in ns since the clock's zero.
+    /// Time of its last sample, in ns from the origin of the clock.
     pub last_ns: i64,
-    /// Messages of its topic.
+    /// Number of messages of its topic.
     pub messages: u64,
 }
 
@@ -33,8 +33,8 @@ struct Summary {
 }
 
 impl Summary {
-    /// Reads it; `None` if there is none, the file cannot be sought, or a record of it cannot be read. The summary reader
-    /// of `mcap` does not suffice: it reserves memory for any length of a text that a chunk index claims.
+    /// Reads it; `None` if there is none, the file is not seekable, or a record of it is unreadable. The summary reader
+    /// of `mcap` is unsuitable: it reserves memory for any text length claimed by a chunk index.
     fn read(input: &Input) -> Option<Self> {
         let path = input.plain_file()?;
         let length = Stored::open(path).ok()?.metadata().ok()?.len();
@@ -76,7 +76,7 @@ impl Summary {
     }
 }
 
-/// A file from a byte on.
+/// Opens a file at an offset.
 fn open_at(input: &Input, at: u64) -> Option<Stored<File>> {
     let mut file = Stored::open(input.plain_file()?).ok()?;
     file.seek(SeekFrom::Start(at)).ok()?;
@@ -96,7 +96,7 @@ pub(super) fn channels(input: &Input) -> Option<Channels> {
     (count > 0 && count == summary.channels.iter().count()).then_some(summary.channels)
 }
 
-/// The end of a signal, told from the summary and the chunk with its latest messages.
+/// The end of a signal, from the summary and the chunk with its latest messages.
 pub(super) fn signal_end(
     input: &Input,
     request: &FieldRequest,

@@ -1,4 +1,4 @@
-//! What is in a file.
+//! Inventory of a file.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -27,7 +27,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
 use crate::warning::Warning;
 
-/// Leaves of a channel whose value in the first message is shown.
+/// Maximum number of leaves of a channel with an example value.
 const EXAMPLES: usize = 64;
 
 /// What is in a file.
@@ -147,15 +147,15 @@ pub struct ChunkReport {
 }
 
 impl Inventory {
-    /// Reads a file from front to end.
+    /// Scans a whole file.
     ///
     /// # Errors
-    /// If it cannot be read or is not MCAP. Damage is no error: it is among the warnings.
+    /// If it cannot be read or is not MCAP. Damage is not an error, but reported in the warnings.
     pub fn scan(input: &Input) -> Result<Self, Failure> {
         Self::read(input.name(), input.open()?)
     }
 
-    /// The same of a stream.
+    /// The same for a stream.
     ///
     /// # Errors
     /// If it cannot be read or is not MCAP.
@@ -181,7 +181,7 @@ pub(super) fn only_topic(input: &Input) -> Result<FieldRequest, Failure> {
              --field effort[0]",
         ));
     }
-    // What JSON messages are made of only a message can tell, so that the file must be gone through.
+    // The structure of JSON messages is only known from a message, so the whole file must be read.
     let channels = index::channels(input).filter(|channels| {
         let mut encodings = channels
             .iter()
@@ -205,7 +205,7 @@ pub(super) fn only_topic(input: &Input) -> Result<FieldRequest, Failure> {
     choose_topic(&input.name(), topics)
 }
 
-/// A topic, and whether there are numbers in its messages or why they cannot be read.
+/// A topic, and whether its messages contain numbers, or why they cannot be read.
 type TopicNumbers = (String, Result<bool, String>);
 
 fn numbers_of(channel: &TopicChannel) -> TopicNumbers {
@@ -255,11 +255,11 @@ struct Scan {
     seen: BTreeMap<u16, ChannelCount>,
     attachments: Vec<AttachmentReport>,
     metadata: Vec<MetadataReport>,
-    /// Message records that are cut short.
+    /// Number of truncated message records.
     broken: u64,
 }
 
-/// What was seen of a channel's messages.
+/// Statistics of a channel's messages.
 struct ChannelCount {
     messages: u64,
     log_ns: (u64, u64),
@@ -390,7 +390,7 @@ impl Scan {
     }
 }
 
-/// Says of neighbouring channels of a topic that their messages mix.
+/// Notes that messages of neighbouring channels of a topic are interleaved.
 fn tell_publishers(channels: &mut [ChannelReport]) {
     for place in 1..channels.len() {
         let [one, other] = [&channels[place - 1], &channels[place]];
@@ -412,7 +412,7 @@ fn report(channel: &TopicChannel, seen: Option<&ChannelCount>) -> ChannelReport 
     let schema = channel.schema.as_ref();
     let first = seen.map(|seen| seen.first.as_slice());
     let layout = match (first, record.message_encoding.as_str()) {
-        // What JSON messages are made of only a message can tell.
+        // The structure of JSON messages is only known from a message.
         (None, "json") => Err("there is no message to tell its fields from".to_owned()),
         (first, _) => channel.layout(first.unwrap_or(&[])),
     };

@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::decode::{Damage, Reading};
 use super::tree::{TreeNode, TreeTargets};
 
-/// Takes the wanted numbers out of a message.
+/// Extracts the wanted numbers from a message.
 pub(crate) fn read(
     targets: &TreeTargets,
     message: &[u8],

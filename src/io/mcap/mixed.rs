@@ -1,4 +1,4 @@
-//! Messages of a topic whose numbers are not those of one signal.
+//! Topics whose messages mix the numbers of several signals.
 
 use std::sync::Arc;
 
@@ -8,12 +8,12 @@ use super::record::RawMessage;
 use super::route::{self, Route};
 use super::schema::{FieldKind, Schema};
 
-/// When the messages of each channel of a topic were logged: number, first and last.
+/// Number, first and last log time of the messages of each channel of a topic.
 #[derive(Debug, Default)]
 pub(super) struct Publishers(Vec<(u16, u64, u64)>);
 
 impl Publishers {
-    /// Takes note of a message; the channels, if two of them have messages between each other's.
+    /// Records a message; returns two channels with interleaved messages.
     pub(super) fn note(&mut self, message: &RawMessage) -> Result<(), [u16; 2]> {
         let (id, at) = (message.channel_id, message.log_time_ns);
         let all = &mut self.0;
@@ -24,14 +24,14 @@ impl Publishers {
         all[place].1 = all[place].1.min(at);
         all[place].2 = all[place].2.max(at);
         let (_, first, last) = all[place];
-        // A recorder that starts anew declares its channels again: one after the other.
+        // A restarted recorder declares its channels again, one after the other.
         let others = all.iter().filter(|one| one.0 != id);
         let mut between = others.filter(|(_, start, end)| first < *end && *start < last);
         between.next().map_or(Ok(()), |other| Err([other.0, id]))
     }
 }
 
-/// Says that the messages of two channels of a topic mix.
+/// Text about interleaved messages of two channels of a topic.
 pub(super) fn two_publishers([one, other]: [u16; 2]) -> String {
     format!(
         "its channels {one} and {other} have messages between each other's: two nodes publish on it, and their samples are not \
@@ -39,10 +39,10 @@ pub(super) fn two_publishers([one, other]: [u16; 2]) -> String {
     )
 }
 
-/// Says that messages name two frames by turns, as where one node publishes what two sensors measure.
+/// Detects messages that alternate between two frames, as when one node publishes two sensors.
 ///
 /// # Errors
-/// A sentence that names them.
+/// A sentence with their names.
 pub(super) fn one_frame<'a>(
     encoding: Encoding,
     schema: &Arc<Schema>,
@@ -57,7 +57,7 @@ pub(super) fn one_frame<'a>(
     };
     let frame = |message| texts(encoding, schema, (number, &way), message)?.pop();
     let frames: Vec<String> = messages.filter_map(frame).collect();
-    // One that comes but does not return is a name that was changed.
+    // One that does not recur is a renamed frame.
     let between = |place: usize| {
         let before = frames[..place].iter().rposition(|f| *f == frames[place])?;
         frames.get(before + 1).filter(|f| **f != frames[place])
@@ -71,11 +71,11 @@ pub(super) fn one_frame<'a>(
     }
 }
 
-/// Says that all items of a list are asked for that is a table of several rows and columns, by the `layout` beside it
-/// (`std_msgs/Float64MultiArray`): taken in their order, the channels of a recorder would be samples of one.
+/// Detects a request for all items of a list that is a table of several rows and columns, according to its `layout`
+/// (`std_msgs/Float64MultiArray`): taken in order, the channels of a recorder would become samples of one.
 ///
 /// # Errors
-/// A sentence that names the ways to a row and to a column.
+/// A sentence on how to select a row or a column.
 pub(super) fn one_row(
     encoding: Encoding,
     schema: &Arc<Schema>,

@@ -2,17 +2,17 @@
 //!
 //! # Data path
 //!
-//! Bytes → `record` (records, chunks unpacked, damage noted) → `channels` (what a channel's messages
-//! are made of, by [`schema`]) → [`route`] (the way to the wanted number) → [`decode`] ([`cdr`],
+//! Bytes → `record` (records, decompressed chunks, damage reports) → `channels` (structure of a
+//! channel's messages, by [`schema`]) → [`route`] (path to the wanted number) → [`decode`] ([`cdr`],
 //! `protobuf`, `json`) → `blocks` and `order` (times) → [`SignalReader`], or [`read_fields`] for several
 //! numbers in one pass.
 //!
-//! # What is believed
+//! # Trust
 //!
-//! No length in a file is believed before the bytes are there: buffers grow with what is read.
-//! Messages of a chunk whose checksum is wrong are left out and the loss is said; a file that is
-//! cut off is used up to its last whole message. Memory is that of one chunk (1 GiB at most), of
-//! the samples held back to be sorted, and of the schemas.
+//! No length in a file is trusted before the bytes are there: buffers grow with the data read. Messages
+//! of a chunk with a wrong checksum are dropped and the loss is reported; a truncated file is used up to
+//! its last complete message. Memory is limited to one chunk (1 GiB at most), the samples held back for
+//! sorting, and the schemas.
 
 #[cfg(test)]
 mod attack_tests;

@@ -1,22 +1,22 @@
-//! Samples put in the order of their times.
+//! Sorting of samples by time.
 
 use std::collections::VecDeque;
 
-/// Samples that are held back to be put in order.
+/// Number of samples held back for sorting.
 pub const WINDOW: usize = 1 << 16;
 
-/// A window that samples pass through: one that comes late is put where it belongs if it is no
-/// more than [`WINDOW`] samples late. Records of up to that many samples are sorted as a whole.
+/// A sorting window for samples: one that is at most [`WINDOW`] samples late is put in its place.
+/// Records of up to that many samples are sorted completely.
 #[derive(Debug, Default)]
 pub struct Sorter {
     held: VecDeque<(i64, f64)>,
-    /// Time of the last sample given away.
+    /// Time of the last sample output.
     given: Option<i64>,
     /// Latest time seen.
     latest: Option<i64>,
-    /// Samples that came after a later one.
+    /// Number of samples that came after a later one.
     pub out_of_order: u64,
-    /// Samples that came too late to be put in order, and were left out.
+    /// Number of samples dropped because they came too late to be sorted.
     pub too_late: u64,
 }
 
@@ -39,12 +39,12 @@ impl Sorter {
             self.too_late += 1;
             return;
         }
-        // Behind all of the same time, so that those keep the order of the file.
+        // After all of the same time, to preserve the order of the file.
         let place = self.held.partition_point(|(held, _)| *held <= time_ns);
         self.held.insert(place, (time_ns, value));
     }
 
-    /// Gives away what need not be held back any more, or everything at the end.
+    /// Outputs the samples that need not be held back any more, or all at the end.
     pub fn give(&mut self, all: bool, times_ns: &mut Vec<i64>, values: &mut Vec<f64>) {
         let keep = if all { 0 } else { WINDOW };
         let count = self.held.len().saturating_sub(keep);

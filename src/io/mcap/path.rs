@@ -1,4 +1,4 @@
-//! A field as people write it: `wrench.torque.z`, `effort[0]`, `effort[-1]`,
+//! Path of a field in user notation: `wrench.torque.z`, `effort[0]`, `effort[-1]`,
 //! `effort[name=motor_joint]`, `data[:]`, `data[0::3]`.
 
 use std::fmt;
@@ -8,27 +8,27 @@ use std::fmt;
 pub enum PathPart {
     /// A field by its name.
     Name(String),
-    /// An item by its place; negative ones count from the end.
+    /// An item by its index; negative ones count from the end.
     Index(i64),
     /// Some items, or all of them: `[:]`, `[0::3]`.
     Slice(Slice),
-    /// The item whose name is known: `[name=motor_joint]`, `[motor_joint]` for short.
+    /// An item by its name: `[name=motor_joint]`, `[motor_joint]` for short.
     Called {
-        /// Field that holds the names, if it was given.
+        /// Field that contains the names, if given.
         key: Option<String>,
         /// The name.
         name: String,
     },
 }
 
-/// Every so many items of a list, from a first one up to a last one: `[start:end:step]` as in Python.
+/// Every n-th item of a list in a range: `[start:end:step]` as in Python.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Slice {
-    /// The first item.
+    /// First item.
     pub start: usize,
-    /// The one that comes no more.
+    /// End, exclusive.
     pub end: usize,
-    /// From one to the next.
+    /// Step.
     pub step: usize,
 }
 
@@ -54,7 +54,7 @@ impl Slice {
         (numbers.next().is_none() && found.start < found.end && found.step > 0).then_some(found)
     }
 
-    /// Drops the other items.
+    /// Removes the other items.
     pub fn keep(&self, items: &mut Vec<f64>) {
         if *self == Self::ALL {
             return;
@@ -88,10 +88,10 @@ impl fmt::Display for Slice {
     }
 }
 
-/// Takes a field apart; empty text is the message itself.
+/// Parses a path; empty text is the message itself.
 ///
 /// # Errors
-/// A sentence that says what was expected.
+/// A sentence about what was expected.
 pub fn parse(text: &str) -> Result<Vec<PathPart>, String> {
     let mut parts = Vec::new();
     let mut rest = text.trim();
@@ -123,7 +123,7 @@ pub fn parse(text: &str) -> Result<Vec<PathPart>, String> {
     Ok(parts)
 }
 
-/// What is in a bracket, and what is behind it. Quotes may hold brackets.
+/// Content of a bracket, and the rest. Quotes may contain brackets.
 fn bracket(text: &str) -> Option<(&str, &str)> {
     let mut quote = None;
     for (at, sign) in text.char_indices() {
@@ -165,7 +165,7 @@ fn item(word: &str, text: &str) -> Result<PathPart, String> {
     Ok(PathPart::Called { key, name })
 }
 
-/// A path whose first item of a list, or all of them, become the one of a name.
+/// A path in which the first item of a list, or all items, are replaced by one selected by name.
 pub fn by_name(mut parts: Vec<PathPart>, name: &str) -> Option<Vec<PathPart>> {
     let is_place = |part: &&mut PathPart| matches!(part, PathPart::Index(_) | PathPart::Slice(_));
     *parts.iter_mut().find(is_place)? = PathPart::Called {
@@ -175,7 +175,7 @@ pub fn by_name(mut parts: Vec<PathPart>, name: &str) -> Option<Vec<PathPart>> {
     Some(parts)
 }
 
-/// The text again.
+/// Converts a path back to text.
 pub fn text(parts: &[PathPart]) -> String {
     let mut text = String::new();
     for part in parts {

@@ -1,4 +1,4 @@
-//! Messages of protobuf, decoded by `prost-reflect`.
+//! Protobuf messages, decoded by `prost-reflect`.
 
 use std::borrow::Cow;
 
@@ -7,7 +7,7 @@ use prost_reflect::{DynamicMessage, FieldDescriptor, MessageDescriptor, ReflectM
 use super::decode::{Damage, Reading};
 use super::tree::{TreeNode, TreeTargets};
 
-/// Takes the wanted numbers out of a message.
+/// Extracts the wanted numbers from a message.
 pub(crate) fn read(
     descriptor: &MessageDescriptor,
     targets: &TreeTargets,
@@ -23,7 +23,7 @@ pub(crate) fn read(
 #[derive(Clone, Copy)]
 enum ProtobufNode<'a> {
     Set(&'a Value),
-    /// A number that is not in the message, where the definition says which one is meant then.
+    /// Default of a number that is not in the message, from the definition.
     Default(f64),
     EmptyList,
 }
@@ -84,8 +84,8 @@ impl<'a> TreeNode<'a> for ProtobufNode<'a> {
     }
 }
 
-/// Whether the absence of a field stands for a value: everywhere in proto3 but for `optional`
-/// fields, before it where the definition gives a default.
+/// Whether an absent field has a value: always in proto3 except for `optional` fields, in proto2 if
+/// the definition gives a default.
 fn has_default(field: &FieldDescriptor) -> bool {
     !field.supports_presence() || field.field_descriptor_proto().default_value.is_some()
 }

@@ -89,7 +89,7 @@ fn read_as(schema: &Arc<Schema>, field: &str, message: &[u8]) -> Result<Reading,
 
 fn message() -> Vec<u8> {
     let mut bytes = b"\x0a\x04\x08\x07\x10\x05\x12\x01a\x12\x01b".to_vec();
-    // Two efforts packed, a third one single.
+    // Two packed efforts, a third single one.
     bytes.extend_from_slice(b"\x1a\x10");
     bytes.extend_from_slice(&1.5_f64.to_le_bytes());
     bytes.extend_from_slice(&(-2.5_f64).to_le_bytes());
@@ -133,7 +133,7 @@ fn what_is_not_set_is_zero_only_where_the_language_says_so() {
         read("z", &message()).unwrap().stamp_ns(),
         Some(7_000_000_005)
     );
-    // A message in two parts is both of them together; within it the last one counts.
+    // A message in two parts is their union; within it the last value counts.
     let parts = b"\x0a\x02\x08\x07\x0a\x04\x10\x05\x08\x09";
     assert_eq!(read("z", parts).unwrap().stamp_ns(), Some(9_000_000_005));
 }

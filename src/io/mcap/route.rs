@@ -1,11 +1,11 @@
-//! The way to a number in messages of one type.
+//! Paths to numbers in messages of one type.
 
 use super::path::{self, PathPart, Slice};
 use super::schema::leaves::{self, Leaf};
 use super::schema::{Field, FieldKind, Number, Schema};
 use crate::failure::did_you_mean;
 
-/// Way to a field in fields, all by their names, and what it is.
+/// Path to a field through fields, by their names, and its type.
 pub(super) fn way<'a>(schema: &'a Schema, names: &[&str]) -> Option<(Vec<Hop>, &'a FieldKind)> {
     let (last, above) = names.split_last()?;
     let mut fields = &schema.root().fields;
@@ -23,15 +23,15 @@ pub(super) fn way<'a>(schema: &'a Schema, names: &[&str]) -> Option<(Vec<Hop>, &
     Some((hops, &fields[place].kind))
 }
 
-/// Leaves that an error message lists.
+/// Maximum number of leaves listed in an error message.
 const LISTED: usize = 40;
 
-/// One step on the way.
+/// One step of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hop {
-    /// Into a field, by its place in the type.
+    /// Into a field, by its index in the type.
     Field(usize),
-    /// To one item, from the front or (negative) from the end.
+    /// To one item, from the start or (negative) from the end.
     Item(i64),
     /// To the item whose name was found.
     Called,
@@ -39,33 +39,34 @@ pub enum Hop {
     All,
 }
 
-/// Texts of a message, one of which is looked for.
+/// Texts of a message, among which one is searched for.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Lookup {
-    /// Way to the texts.
+    /// Path to the texts.
     pub hops: Vec<Hop>,
     /// The text.
     pub name: String,
 }
 
-/// The way to a number, or to several.
+/// Path to a number, or to several.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Route {
-    /// Path as text, all choices made.
+    /// Path as text, with all choices made.
     pub text: String,
-    /// The way.
+    /// The path.
     pub hops: Vec<Hop>,
-    /// Which of several values count.
+    /// Selection among several values.
     pub slice: Slice,
     /// What must be found first.
     pub lookup: Option<Lookup>,
-    /// FieldKind of number.
+    /// Type of number.
     pub number: Number,
-    /// Unit as the definition states it.
+    /// Unit stated by the definition.
     pub unit: Option<String>,
-    /// Names of the types passed, from the message's own to the one that holds the number.
+    /// Names of the types on the path, from that of the message to the one that contains the
+    /// number.
     pub types: Vec<String>,
-    /// Names of the fields passed.
+    /// Names of the fields on the path.
     pub fields: Vec<String>,
 }
 
@@ -75,10 +76,10 @@ impl Route {
         self.hops.contains(&Hop::All)
     }
 
-    /// Finds the way to a field. Without any parts it is the only number there is.
+    /// Finds the path to a field. Without any parts it is the only number there is.
     ///
     /// # Errors
-    /// A sentence that says what is there and what was probably meant.
+    /// A sentence with the available fields and a suggestion.
     pub fn find(schema: &Schema, parts: &[PathPart]) -> Result<Self, String> {
         let only;
         let parts = if parts.is_empty() {
@@ -107,7 +108,7 @@ fn only_leaf(schema: &Schema) -> Result<Vec<PathPart>, String> {
     }
 }
 
-/// What is there, for the end of an error message.
+/// The available fields, for the end of an error message.
 fn list(found: &[Leaf]) -> String {
     if found.is_empty() {
         return "there is no number in its messages".to_owned();
@@ -133,9 +134,9 @@ struct RouteWalk<'a> {
     unit: Option<String>,
     types: Vec<String>,
     fields: Vec<String>,
-    /// The type that holds the last field.
+    /// The type that contains the last field.
     owner: usize,
-    /// Hops to it.
+    /// Number of hops to it.
     owner_hops: usize,
 }
 
@@ -219,7 +220,7 @@ impl<'a> RouteWalk<'a> {
         Ok(())
     }
 
-    /// The names are in a list beside this one, or in a field of its items.
+    /// The names are in a list next to this one, or in a field of its items.
     fn called(&mut self, place: usize, key: Option<&str>, name: &str) -> Result<(), String> {
         if self.lookup.is_some() {
             return Err("only one item can be chosen by name".to_owned());
@@ -292,7 +293,7 @@ impl<'a> RouteWalk<'a> {
         })
     }
 
-    /// An error with what is there, what lies below the part that was found first.
+    /// An error with the available fields below the part that was found.
     fn miss(&self, why: &str) -> String {
         let (found, _) = leaves::leaves(self.schema);
         let start = self.fields.join(".");

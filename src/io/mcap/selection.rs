@@ -1,10 +1,10 @@
-//! Which number of which topic.
+//! Selection of a number and its topic.
 
 use super::channels::{Channels, TopicChannel};
 use super::path::{self, PathPart};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
 
-/// What the command line chooses.
+/// Selection on the command line.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FieldChoice {
     /// `--topic /joint_states`
@@ -15,22 +15,22 @@ pub struct FieldChoice {
     pub signal: Option<String>,
 }
 
-/// The choice, as far as it can be told without the file.
+/// The selection, as far as it is known without the file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FieldRequest {
-    /// A topic and a field, none for the only number there is.
+    /// A topic and a field; no parts for the only number there is.
     Topic(String, Vec<PathPart>),
-    /// Both in one text; which part is the topic only the file can tell.
+    /// Both in one text; the file determines which part is the topic.
     Signal(String),
     /// The only number in the file.
     Only,
 }
 
 impl FieldChoice {
-    /// Checks what does not need the file.
+    /// Checks the selection as far as possible without the file.
     ///
     /// # Errors
-    /// [`Failure::Usage`] if the choice contradicts itself or is not written as one.
+    /// [`Failure::Usage`] if the selection contradicts itself or is malformed.
     pub fn check(&self) -> Result<FieldRequest, Failure> {
         let field = self.field.as_deref().unwrap_or("");
         match (&self.signal, &self.topic) {
@@ -61,8 +61,8 @@ impl FieldChoice {
 }
 
 impl FieldRequest {
-    /// The field in a channel's messages, if the channel's topic is wanted. Text that is no field
-    /// is an error only there.
+    /// The field in a channel's messages, if the channel's topic is selected. Text that is not a
+    /// field is an error only there.
     pub fn field_in(&self, channel: &TopicChannel, channels: &Channels) -> Option<FieldText> {
         let topic = &channel.record.topic;
         match self {
@@ -71,7 +71,7 @@ impl FieldRequest {
             }
             Self::Signal(signal) => {
                 let rest = behind(signal, topic)?;
-                // A longer topic that fits is meant, as "/a.b" by "/a.b.x".
+                // The longest matching topic counts, such as "/a.b" in "/a.b.x".
                 let is_longest = channels.iter().all(|other| {
                     other.record.topic.len() <= topic.len()
                         || behind(signal, &other.record.topic).is_none()
@@ -82,7 +82,7 @@ impl FieldRequest {
         }
     }
 
-    /// Says that no channel fits, and which there are.
+    /// Message that no channel matches, with the available ones.
     pub fn miss(&self, channels: &Channels) -> String {
         let mut topics: Vec<_> = channels
             .iter()
@@ -119,20 +119,20 @@ impl FieldRequest {
     }
 }
 
-/// A field, taken apart or as text.
+/// A field, parsed or as text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FieldText {
-    /// Taken apart.
+    /// Parsed.
     Parts(Vec<PathPart>),
     /// As text.
     Text(String),
 }
 
 impl FieldText {
-    /// Takes it apart.
+    /// Parses the text, if necessary.
     ///
     /// # Errors
-    /// A sentence that says what was expected.
+    /// A sentence about what was expected.
     pub fn parts(self) -> Result<Vec<PathPart>, String> {
         match self {
             Self::Parts(parts) => Ok(parts),
@@ -141,14 +141,14 @@ impl FieldText {
     }
 }
 
-/// Whether two topics are the same but for a slash in front.
+/// Whether two topics are equal except for a leading slash.
 fn is_same(topic: &str, wanted: &str) -> bool {
     topic == wanted
         || topic.strip_prefix('/') == Some(wanted)
         || wanted.strip_prefix('/') == Some(topic)
 }
 
-/// What is behind a topic in a signal; none if it does not begin with it.
+/// The text after a topic in a signal; `None` if it does not begin with it.
 fn behind<'a>(signal: &'a str, topic: &str) -> Option<&'a str> {
     let bare = topic.strip_prefix('/').unwrap_or(topic);
     let rest = signal.strip_prefix(topic).or_else(|| {

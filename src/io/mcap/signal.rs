@@ -1,4 +1,4 @@
-//! One number of one topic while a file is read.
+//! One number of one topic, while a file is read.
 
 use std::sync::Arc;
 
@@ -20,19 +20,19 @@ use super::writer;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::names_compensated;
 
-/// Messages looked at before the time is chosen.
+/// Number of messages examined before the time is chosen.
 const FIRST: usize = 16;
 
-/// How the samples of messages get their times.
+/// Options for the times of samples in messages.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct TimeOptions {
-    /// The clock; chosen by the messages if not given.
+    /// The clock; chosen from the messages if not given.
     pub time: Option<TimeChoice>,
-    /// Field that holds the spacing of samples, for messages with many of them.
+    /// Field with the spacing of samples, for messages with several of them.
     pub spacing: Option<String>,
 }
 
-/// What was chosen, for people.
+/// The selection, for messages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SelectedSignal {
     /// Topic.
@@ -43,16 +43,16 @@ pub struct SelectedSignal {
     pub encoding: String,
     /// Field.
     pub field: String,
-    /// Unit, if the file states it.
+    /// Unit, if stated in the file.
     pub unit: Option<UnitFound>,
     /// Whether the channel is marked as a result of `compensate`.
     pub is_compensated: bool,
-    /// Which time counts, and why.
+    /// The time used, and why.
     pub time: TimeUsed,
 }
 
-/// Whether a channel says of itself that it is a result of `compensate`, by its metadata or, where a tool has dropped
-/// them, by its topic or field.
+/// Whether a channel is marked as a result of `compensate`, by its metadata or, if a tool has dropped them, by its
+/// topic or field.
 fn is_compensated(channel: &::mcap::records::Channel, field: &str) -> bool {
     let marked = channel.metadata.get(writer::COMPENSATED_KEY);
     marked.is_some_and(|value| value == "true")
@@ -62,19 +62,19 @@ fn is_compensated(channel: &::mcap::records::Channel, field: &str) -> bool {
 
 /// A signal whose topic has been found.
 pub(super) struct TopicSignal {
-    /// Name of the file, for people.
+    /// Name of the file, for messages.
     name: String,
-    /// The first channel of the topic; others must be like it.
+    /// The first channel of the topic; others must have the same type.
     channel: Arc<TopicChannel>,
-    /// For each channel whether it is of the topic.
+    /// Whether each channel belongs to the topic.
     is_ours: Vec<Option<bool>>,
     publishers: Publishers,
     pub selected: SelectedSignal,
     pub options: TimeOptions,
     decoder: Decoder,
-    /// The way to the number.
+    /// The path to the number.
     route: Route,
-    /// The field with the name of its item, if it was asked for by its place and has one.
+    /// The field with the name of its item, if it was requested by index and has one.
     pub by_name: Option<String>,
     reading: Reading,
     /// Messages held back until the time is chosen.
@@ -88,7 +88,7 @@ pub(super) struct TopicSignal {
     pub log_offset_ns: i64,
 }
 
-/// A message kept for later.
+/// A copy of a message for later use.
 struct CopiedMessage {
     log_time_ns: u64,
     publish_time_ns: u64,
@@ -96,7 +96,7 @@ struct CopiedMessage {
 }
 
 impl TopicSignal {
-    /// The signal that is asked for, if a message is the first of its topic.
+    /// The requested signal, if a message is the first of its topic.
     pub fn find(
         request: &FieldRequest,
         message: &RawMessage,
@@ -177,10 +177,10 @@ impl TopicSignal {
         })
     }
 
-    /// Takes a message if it is of the topic.
+    /// Takes a message if it belongs to the topic.
     ///
     /// # Errors
-    /// If channels of the topic are of different types, or the messages lack the time that is asked for.
+    /// If channels of the topic have different types, or the messages lack the requested time.
     pub fn take(&mut self, message: &RawMessage, channels: &Channels) -> Result<bool, Failure> {
         let id = usize::from(message.channel_id);
         if self.is_ours[id].is_none() {
@@ -213,10 +213,10 @@ impl TopicSignal {
         Ok(true)
     }
 
-    /// Takes note that there are no more messages.
+    /// Handles the end of the messages.
     ///
     /// # Errors
-    /// If the messages lack the time that is asked for.
+    /// If the messages lack the requested time.
     pub fn end(&mut self) -> Result<(), Failure> {
         if !self.is_time_chosen {
             self.choose_time()?;
@@ -266,7 +266,7 @@ impl TopicSignal {
             });
     }
 
-    /// The chosen time of the message that was decoded last.
+    /// The chosen time of the last decoded message.
     fn time_ns(&self, log_time_ns: u64, publish_time_ns: u64) -> Option<i64> {
         match self.selected.time.choice {
             TimeChoice::Log => i64::try_from(log_time_ns).ok(),
@@ -275,7 +275,7 @@ impl TopicSignal {
         }
     }
 
-    /// Refuses messages of two frames.
+    /// Rejects messages of two frames.
     fn check_frames(&self, first: &[CopiedMessage]) -> Result<(), Failure> {
         let data = first.iter().map(|message| &message.data[..]);
         let layout = self
@@ -294,8 +294,8 @@ impl TopicSignal {
         })
     }
 
-    /// Takes the time that the user names, or the messages' own stamp if they have one that is set, and
-    /// decodes the messages that were held back.
+    /// Chooses the time named by the user, or the messages' own stamp if present and set, and decodes
+    /// the messages held back.
     fn choose_time(&mut self) -> Result<(), Failure> {
         let field = self.selected.time.field.take();
         if self.options.time == Some(TimeChoice::Header) && field.is_none() {
@@ -340,7 +340,7 @@ impl TopicSignal {
     }
 }
 
-/// The way by name to an item that is asked for by its place, if the first message names it: joints change their places when
+/// The path by name to an item requested by index, if the first message names it: joints change their index when
 /// several nodes publish on a topic.
 fn by_name(
     encoding: Encoding,
@@ -364,8 +364,8 @@ fn by_name(
     (is_only && is_same).then_some(named)
 }
 
-/// Asks which item of a list is meant, where the only number of a topic is a list whose items have names of their own: they
-/// are no samples of one signal.
+/// Asks for an item of a list, if the only number of a topic is a list with named items, which are not samples of one
+/// signal.
 fn ask_for_item(
     encoding: Encoding,
     schema: &Arc<Schema>,
@@ -389,7 +389,7 @@ fn ask_for_item(
     }
 }
 
-/// The time that counts, and why: the one asked for, or what the messages carry in a field.
+/// The time to use, and why: the requested one, or a field of the messages.
 fn choice_of_time(
     asked: Option<TimeChoice>,
     field: Option<&str>,
@@ -412,7 +412,7 @@ fn choice_of_time(
     }
 }
 
-/// Whether a channel is of the topic; none if it is not declared.
+/// Whether a channel belongs to the topic; `None` if it is not declared.
 fn is_ours(
     ours: &TopicChannel,
     channels: &Channels,

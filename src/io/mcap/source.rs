@@ -1,4 +1,4 @@
-//! Numbers of an MCAP file as signals, read as a stream.
+//! Numbers of an MCAP file as streamed signals.
 
 use std::io::Read;
 
@@ -16,15 +16,15 @@ use super::summary::SignalSummary;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
 
-/// Messages read before samples are given away.
+/// Number of messages read before samples are output.
 const BATCH: usize = 1 << 13;
 
-/// A signal that is open for reading.
+/// An open signal.
 pub struct SignalReader {
     pass: Pass,
     request: FieldRequest,
     signal: TopicSignal,
-    /// Messages that were taken in opening.
+    /// Number of messages read while opening.
     ahead: usize,
 }
 
@@ -32,7 +32,8 @@ impl SignalReader {
     /// Opens a file and finds the number in it.
     ///
     /// # Errors
-    /// If the file cannot be read, or the number is not in it: then with what is there.
+    /// If the file cannot be read, or does not contain the number; the message lists the available
+    /// ones.
     pub fn open(
         input: &Input,
         choice: &FieldChoice,
@@ -41,10 +42,10 @@ impl SignalReader {
         Self::with_stream(input, input.open()?, choice, options)
     }
 
-    /// The same of an input that is open.
+    /// The same for an open input.
     ///
     /// # Errors
-    /// Those of [`Self::open`].
+    /// As for [`Self::open`].
     pub fn with_stream(
         input: &Input,
         stream: Box<dyn Read + Send>,
@@ -80,34 +81,34 @@ impl SignalReader {
         })
     }
 
-    /// Name of the file, for people.
+    /// Name of the file, for messages.
     pub fn name(&self) -> &str {
         self.pass.records.name()
     }
 
-    /// What was chosen.
+    /// The selection.
     pub fn selected(&self) -> &SelectedSignal {
         &self.signal.selected
     }
 
-    /// The chosen time of the first message minus its log time, in ns: what a time must be
-    /// lessened by to lie among the log times of the file.
+    /// The chosen time of the first message minus its log time, in ns: the offset from the file's
+    /// log times.
     pub fn log_offset_ns(&self) -> i64 {
         self.signal.log_offset_ns
     }
 
-    /// The end of the signal, if the file has a summary and can be sought.
+    /// The end of the signal, if the file has a summary and is seekable.
     pub fn end(&self) -> Option<SignalEnd> {
         let signal = &self.signal;
         let (selected, options) = (&signal.selected, &signal.options);
         index::signal_end(&self.pass.input, &self.request, selected, options)
     }
 
-    /// Gives the next samples in the order of their times, in ns since the clock's zero; false
-    /// when there are none left. What is in the two lists is replaced.
+    /// Replaces the content of the two lists by the next samples in the order of their times, in ns
+    /// from the origin of the clock; `false` at the end.
     ///
     /// # Errors
-    /// If the file cannot be read, or channels of the topic are of different types.
+    /// If the file cannot be read, or channels of the topic have different types.
     pub fn next(
         &mut self,
         times_ns: &mut Vec<i64>,
@@ -116,7 +117,7 @@ impl SignalReader {
         times_ns.clear();
         values.clear();
         let mut is_first = true;
-        // Rates are told from the first block, which must not be a short one.
+        // Rates are determined from the first block, which must not be short.
         while values.len() < BATCH && (is_first || !self.pass.is_at_end) {
             is_first = false;
             let signal = &mut self.signal;
@@ -132,18 +133,18 @@ impl SignalReader {
         Ok(!values.is_empty())
     }
 
-    /// Says what was read and what was not; to be called at the end.
+    /// Summary of what was read; to be called at the end.
     pub fn finish(self) -> SignalSummary {
         self.pass.summary(&self.signal)
     }
 }
 
-/// What was read of a number, or why it was not.
+/// Result of reading a number.
 pub type FieldResult = Result<(SelectedSignal, SignalSummary), Failure>;
 
-/// Reads several numbers of any topics in one pass and calls `each` with the place of the choice, times in
-/// ns and values. The samples of a choice are in order of time; choices take turns. One result for each
-/// choice: an error for one that is not in the file.
+/// Reads several numbers of any topics in one pass and calls `each` with the index of the selection, times
+/// in ns and values. Samples of one selection are in order of time; selections alternate. Returns one
+/// result per selection: an error for one that is not in the file.
 ///
 /// # Errors
 /// If the file cannot be read.
@@ -192,7 +193,7 @@ pub fn read_fields(
     Ok(wanted.into_iter().map(result).collect())
 }
 
-/// A signal that is asked for.
+/// A requested signal.
 struct RequestedSignal {
     request: FieldRequest,
     /// The signal, once a message of its topic has been seen.
@@ -242,7 +243,7 @@ impl RequestedSignal {
         self.is_done = true;
     }
 
-    /// Gives away what need not be held back, or, at the end of the file, everything.
+    /// Outputs the samples that need not be held back or, at the end of the file, all.
     fn give(&mut self, all: bool, times_ns: &mut Vec<i64>, values: &mut Vec<f64>) {
         times_ns.clear();
         values.clear();
@@ -257,12 +258,12 @@ impl RequestedSignal {
     }
 }
 
-/// A way through a file from front to end.
+/// A pass through a file.
 struct Pass {
     input: Input,
     records: RecordReader,
     channels: Channels,
-    /// Message records that are cut short.
+    /// Number of truncated message records.
     broken: u64,
     is_second: bool,
     is_at_end: bool,
@@ -280,7 +281,7 @@ impl Pass {
         })
     }
 
-    /// Reads until so many messages have been taken, or to the end.
+    /// Reads until a number of messages have been taken, or to the end.
     fn read(
         &mut self,
         messages: usize,
@@ -303,8 +304,8 @@ impl Pass {
         Ok(())
     }
 
-    /// Goes back to the front if that may help to find a topic: where the chunk that declares a channel is
-    /// damaged, the end of the file may have declared it again.
+    /// Restarts from the beginning if that may help to find a topic: if the chunk that declares a channel
+    /// is damaged, the end of the file may have declared it again.
     fn read_again(&mut self) -> Result<bool, Failure> {
         if self.is_second || self.records.losses().count == 0 || self.input == Input::Stdin {
             return Ok(false);
@@ -314,7 +315,7 @@ impl Pass {
         Ok(true)
     }
 
-    /// The failure of a file without the wanted topic: what is there, and what was lost.
+    /// Failure for a missing topic, with the available ones and the losses.
     fn missed(&self, request: &FieldRequest) -> Failure {
         let mut message = format!("{}: {}", self.records.name(), request.miss(&self.channels));
         for loss in &self.records.losses().first {

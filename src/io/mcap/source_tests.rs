@@ -107,7 +107,7 @@ fn channels_of_a_damaged_first_chunk_are_known_from_the_end_of_the_file() {
     assert!(values.len() > 500 && values.len() < 1000);
     let summary = reader.finish();
     assert!(summary.is_lossy && summary.warnings[0].code == "mcap-damaged-chunk");
-    // The same in one pass with others: nothing is given twice.
+    // The same in one pass with others: nothing is output twice.
     let choices = [choice("/y"), choice("/z"), choice("/x")];
     let mut counts = [0; 3];
     let results = read_fields(&input, &choices, &options, |place, times, values| {

@@ -1,4 +1,4 @@
-//! What was read of a signal, and what was not.
+//! Summary of the reading of a signal.
 
 use super::decode::Damage;
 use super::order::{Sorter, WINDOW};
@@ -6,45 +6,45 @@ use super::record::reader::RecordReader;
 use super::signal::{SelectedSignal, TopicSignal};
 use crate::warning::Warning;
 
-/// What a signal came to.
+/// Summary of a signal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SignalSummary {
-    /// Messages of the topic.
+    /// Number of messages of the topic.
     pub messages: u64,
-    /// Samples that were given.
+    /// Number of samples output.
     pub samples: u64,
-    /// Messages without the item that is wanted.
+    /// Number of messages without the wanted item.
     pub without_item: u64,
-    /// Messages that could not be read.
+    /// Number of unreadable messages.
     pub unreadable: u64,
-    /// Samples that came after a later one.
+    /// Number of samples that came after a later one.
     pub out_of_order: u64,
     /// Whether data were lost: exit code 3.
     pub is_lossy: bool,
-    /// What a user should know.
+    /// Warnings.
     pub warnings: Vec<Warning>,
 }
 
 /// Counts while reading.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
-    /// Messages of the topic.
+    /// Number of messages of the topic.
     pub messages: u64,
-    /// Messages without a time.
+    /// Number of messages without a time.
     pub without_time: u64,
     samples: u64,
     without_item: Skipped,
-    /// Messages without the item, though the list or the field is one that any of them may have.
+    /// Number of messages without the item, where the list or field is optional.
     unset: u64,
     unreadable: Skipped,
     last_ns: Option<i64>,
-    /// Place of the item in the first message, if it is read by its name.
+    /// Index of the item in the first message, if it is read by its name.
     first_place: Option<usize>,
-    /// Messages that have it at another one.
+    /// Number of messages with another index.
     moved: u64,
 }
 
-/// Messages left out, and why the first of them was.
+/// Number of skipped messages, and why the first of them was.
 #[derive(Debug, Default)]
 struct Skipped {
     count: u64,
@@ -67,7 +67,7 @@ impl Skipped {
 }
 
 impl Tally {
-    /// Counts a message that gives no value.
+    /// Counts a message without a value.
     pub fn skip(&mut self, damage: Damage, log_time_ns: u64) {
         self.unset += u64::from(!matches!(damage, Damage::NoName { .. }));
         let skipped = match damage {
@@ -79,7 +79,7 @@ impl Tally {
         skipped.add(damage, log_time_ns);
     }
 
-    /// Looks where a message has the item, if it is read by its name.
+    /// Checks the index of the item in a message, if it is read by its name.
     pub fn place(&mut self, place: Option<usize>) {
         if let Some(place) = place {
             let first = *self.first_place.get_or_insert(place);
@@ -87,13 +87,13 @@ impl Tally {
         }
     }
 
-    /// Counts samples that are given.
+    /// Counts output samples.
     pub fn samples(&mut self, times_ns: &[i64]) {
         self.samples += times_ns.len() as u64;
         self.last_ns = times_ns.last().copied().or(self.last_ns);
     }
 
-    /// What is said of messages that gave no sample.
+    /// Warnings about messages without a sample.
     fn left_out(&self, signal: &TopicSignal, broken: u64) -> Vec<Warning> {
         let SelectedSignal { topic, field, .. } = &signal.selected;
         let mut warnings = Vec::new();
@@ -127,8 +127,8 @@ impl Tally {
 }
 
 impl SignalSummary {
-    /// What a signal came to; `broken` message records of the file were cut short, `conflicts`
-    /// declarations contradicted earlier ones.
+    /// Summary of a signal, with `broken` truncated message records in the file and `conflicts`
+    /// contradictory declarations.
     pub(super) fn of(
         signal: &TopicSignal,
         records: &RecordReader,
@@ -143,7 +143,7 @@ impl SignalSummary {
         let clock = signal.clock.warnings().into_iter();
         warnings.extend(clock.map(|said| Warning::new("mcap-clock", format!("{topic}: {said}"))));
         warnings.extend(conflict(conflicts));
-        // A number that no message has is none of the file.
+        // A number in no message does not exist in the file.
         let unset = if tally.samples > 0 { tally.unset } else { 0 };
         let skipped = tally.unreadable.count + tally.without_time + broken + unset;
         Self {
@@ -160,7 +160,7 @@ impl SignalSummary {
     }
 }
 
-/// What is said of declarations that contradict an earlier one.
+/// Warning about declarations that contradict an earlier one.
 pub(super) fn conflict(conflicts: u64) -> Option<Warning> {
     let message = format!(
         "{conflicts} schemas or channels are declared again with another content; the first \
@@ -191,7 +191,7 @@ pub(super) fn losses(records: &RecordReader, last_ns: Option<i64>) -> Vec<Warnin
     warnings
 }
 
-/// What is said of samples that came after later ones.
+/// Warning about samples that came after later ones.
 fn out_of_order(topic: &str, sorter: &Sorter) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let mut say = |code, message: String| warnings.push(Warning::new(code, message));

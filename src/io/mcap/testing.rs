@@ -24,12 +24,12 @@ pub fn stream(bytes: &[u8]) -> Box<dyn Read + Send> {
     Box::new(Cursor::new(bytes.to_vec()))
 }
 
-/// What is in bytes in memory.
+/// Inventory of bytes in memory.
 pub fn inventory(bytes: &[u8]) -> Inventory {
     Inventory::read("test.mcap".to_owned(), stream(bytes)).unwrap()
 }
 
-/// A number of bytes in memory.
+/// Opens a number in bytes in memory.
 pub fn open(
     bytes: &[u8],
     (topic, field): (&str, &str),
@@ -54,7 +54,7 @@ pub fn drain(reader: &mut SignalReader) -> (Vec<i64>, Vec<f64>) {
     (all_times, all_values)
 }
 
-/// Where the chunks of a file begin.
+/// Offsets of the chunks of a file.
 pub fn chunks(bytes: &[u8]) -> Vec<usize> {
     let input = CountedInput::new(stream(bytes));
     let mut file = FileReader::new("test.mcap".to_owned(), input).unwrap();
@@ -72,7 +72,7 @@ pub struct File {
     writer: Writer<Cursor<Vec<u8>>>,
 }
 
-/// Options with that compression and small chunks.
+/// Options with a compression and small chunks.
 pub fn options(compression: Option<Compression>) -> WriteOptions {
     WriteOptions::new()
         .compression(compression)
@@ -89,7 +89,7 @@ impl File {
         Self { writer }
     }
 
-    /// Adds a channel with its schema; the encodings as `cdr+ros2msg`.
+    /// Adds a channel with its schema; encodings such as `cdr+ros2msg`.
     pub fn channel(&mut self, id: u16, topic: &str, encodings: &str, schema: (&str, &[u8])) {
         let (message, language) = encodings.split_once('+').unwrap();
         let schema = self

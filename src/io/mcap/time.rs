@@ -1,22 +1,22 @@
-//! Which of a message's times counts.
+//! Selection among the times of a message.
 
 use super::route::{self, Hop};
 use super::schema::leaves::{is_nanoseconds, is_seconds, is_stamp};
 use super::schema::{FieldKind, Schema};
 
-/// The time that samples are placed at.
+/// Time assigned to samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TimeChoice {
-    /// When the message was recorded.
+    /// Log time.
     Log,
-    /// When it was published.
+    /// Publish time.
     Publish,
     /// The stamp within the message.
     Header,
 }
 
 impl TimeChoice {
-    /// Reads `log`, `publish` or `header`.
+    /// Parses `log`, `publish` or `header`.
     pub fn parse(text: &str) -> Option<Self> {
         match text {
             "log" => Some(Self::Log),
@@ -26,7 +26,7 @@ impl TimeChoice {
         }
     }
 
-    /// As a user writes it.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Log => "log",
@@ -36,14 +36,14 @@ impl TimeChoice {
     }
 }
 
-/// The choice made, and why.
+/// The choice, and why.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TimeUsed {
     /// The time.
     pub choice: TimeChoice,
-    /// Field of the stamp, if it is the header's.
+    /// Field of the stamp, for `Header`.
     pub field: Option<String>,
-    /// Why, for people.
+    /// The reason, for messages.
     pub why: String,
 }
 
@@ -52,15 +52,15 @@ pub struct TimeUsed {
 pub struct Stamp {
     /// Path of the field.
     pub text: String,
-    /// Way to its seconds.
+    /// Path to its seconds.
     pub seconds: Vec<Hop>,
-    /// Way to its nanoseconds.
+    /// Path to its nanoseconds.
     pub nanoseconds: Vec<Hop>,
 }
 
 impl Stamp {
     /// Finds it: `header.stamp`, then `stamp` or `timestamp` in the message itself or in its
-    /// header, then the only field that is a `google.protobuf.Timestamp`.
+    /// header, then the only field of type `google.protobuf.Timestamp`.
     pub fn find(schema: &Schema) -> Option<Self> {
         let named = [
             &["header", "stamp"][..],
@@ -89,7 +89,7 @@ impl Stamp {
             return None;
         };
         let fields = &schema.structs[*index].fields;
-        // JSON has no order, so the fields are told by their names.
+        // JSON has no order, so the fields are identified by name.
         let place = |is: fn(&str) -> bool| fields.iter().position(|field| is(&field.name));
         let (seconds, nanoseconds) = (place(is_seconds)?, place(is_nanoseconds)?);
         let is_numbers = [seconds, nanoseconds]

@@ -1,4 +1,4 @@
-//! Numbers in messages that are read as trees of values: JSON and protobuf.
+//! Numbers in messages that are parsed as trees of values: JSON and protobuf.
 
 use super::decode::{Damage, Names, Reading, Targets};
 use super::route::Hop;
@@ -17,7 +17,7 @@ pub(crate) trait TreeNode<'a>: Copy {
     fn text(self) -> Option<&'a [u8]>;
 }
 
-/// Routes to the wanted numbers, with fields by name.
+/// Paths to the wanted numbers, with fields by name.
 pub struct TreeTargets {
     value: Vec<TreeStep>,
     lookup: Option<(Vec<TreeStep>, String)>,
@@ -49,7 +49,7 @@ impl TreeTargets {
         }
     }
 
-    /// Takes the wanted numbers out of a message.
+    /// Extracts the wanted numbers from a message.
     pub(crate) fn read<'a>(
         &self,
         message: impl TreeNode<'a>,
@@ -132,7 +132,7 @@ fn collect<'a>(
     Ok(())
 }
 
-/// Place of an item counted from the front or, if negative, from the end.
+/// Index of an item counted from the start or, if negative, from the end.
 pub(crate) fn item_place(index: i64, count: usize) -> Result<usize, Damage> {
     let from_front = if index < 0 {
         index.saturating_add(count as i64)
@@ -146,7 +146,7 @@ pub(crate) fn item_place(index: i64, count: usize) -> Result<usize, Damage> {
     })
 }
 
-/// Compares each text at the end of a path. An item without a name counts as an item all the same.
+/// Compares each text at the end of a path. An item without a name counts as well.
 fn collect_names<'a>(node: impl TreeNode<'a>, steps: &[TreeStep], names: &mut Names) {
     match steps.split_first() {
         None => match node.text() {

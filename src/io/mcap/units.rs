@@ -4,16 +4,16 @@ use std::collections::BTreeMap;
 
 use super::route::Route;
 
-/// Where a unit comes from.
+/// A unit and its origin.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnitFound {
     /// The unit as text.
     pub unit: String,
-    /// Where it is from, for people.
+    /// Its origin, for messages.
     pub from: String,
 }
 
-/// Units that standard messages of ROS state in their definitions (REP 103): type, field, unit.
+/// Units of standard ROS messages, from their definitions (REP 103): type, field, unit.
 const STANDARD: &[(&str, &str, &str)] = &[
     ("sensor_msgs/JointState", "position", "rad"),
     ("sensor_msgs/JointState", "velocity", "rad/s"),
@@ -47,10 +47,10 @@ const STANDARD: &[(&str, &str, &str)] = &[
     ("trajectory_msgs/JointTrajectoryPoint", "effort", "N m"),
 ];
 
-/// The unit of a number: what the definition says, what the channel's metadata say (`unit` or
-/// `units`, or `unit.FIELD` for one field), or what the standard message is defined to hold.
-/// Effort of a joint that slides would be in N; the definition cannot tell, a turning joint is
-/// taken, and it is said.
+/// Unit of a number: from the definition, from the channel's metadata (`unit` or `units`, or
+/// `unit.FIELD` for one field), or from the standard message. The effort of a prismatic joint would
+/// be in N; as the definition does not distinguish, a revolute joint is assumed and the assumption
+/// reported.
 pub fn find(route: &Route, metadata: &BTreeMap<String, String>) -> Option<UnitFound> {
     let found = |unit: &str, from: String| {
         (!unit.is_empty()).then(|| UnitFound {
@@ -73,7 +73,7 @@ pub fn find(route: &Route, metadata: &BTreeMap<String, String>) -> Option<UnitFo
             return found(unit, format!("the channel's metadata \"{key}\""));
         }
     }
-    // The innermost type that has something to say is the nearest to the number.
+    // The innermost type with a unit is the closest to the number.
     for (place, name) in route.types.iter().enumerate().rev() {
         let field = route.fields.get(place).map(String::as_str);
         let standard = STANDARD

@@ -1,4 +1,4 @@
-//! Files of other programs that are refused with the way to convert them: ROS 2 bags of SQLite, and HDF5.
+//! Files of other programs that are rejected with advice on conversion: ROS 2 bags of SQLite, and HDF5.
 
 use super::bytes::Bytes;
 use super::{Content, Format};
@@ -15,7 +15,7 @@ pub(super) const BAG: Format = Format {
 
 const SQLITE: &[u8] = b"SQLite format 3\0";
 const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
-/// Where HDF5 begins in a file of MATLAB.
+/// Offset of HDF5 in a MATLAB file.
 const BEHIND_MATLAB: usize = 512;
 
 fn is(head: &[u8]) -> bool {
@@ -23,7 +23,7 @@ fn is(head: &[u8]) -> bool {
     begins.iter().any(|begin| head.starts_with(begin)) || is_matlab_hdf5(head)
 }
 
-/// Whether it is a file of MATLAB 7.3: the version in its head is 2.
+/// Whether it is a MATLAB 7.3 file: the version in its header is 2.
 fn is_matlab_hdf5(head: &[u8]) -> bool {
     let version = head.get(124..BEHIND_MATLAB.min(128));
     head.starts_with(b"MATLAB") && version.is_some_and(|v| v == b"\0\x02IM" || v == b"\x02\0MI")

@@ -1,20 +1,20 @@
-//! Bytes of a file from front to end, with the place.
+//! Sequential bytes of a file, with their position.
 
 use std::io::{Cursor, Read};
 
 use crate::failure::Failure;
 
-/// Bytes that are skipped at a time.
+/// Number of bytes skipped at a time.
 const PIECE: u64 = 1 << 16;
 
-/// Order of the bytes of a number.
+/// Byte order of a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Order {
     Little,
     Big,
 }
 
-/// What is read from front to end.
+/// A sequential reader.
 pub(super) struct Bytes {
     input: Box<dyn Read + Send>,
     /// Bytes read so far.
@@ -26,7 +26,7 @@ impl Bytes {
         Self { input, at: 0 }
     }
 
-    /// Of bytes in memory, which begin at a place of the file.
+    /// For bytes in memory that begin at a position of the file.
     pub(super) fn of(bytes: Vec<u8>, at: u64) -> Self {
         Self {
             input: Box::new(Cursor::new(bytes)),
@@ -34,7 +34,8 @@ impl Bytes {
         }
     }
 
-    /// The next bytes, fewer at the end of the file. A count that the file claims reserves nothing.
+    /// The next bytes, fewer at the end of the file. Nothing is reserved for a count claimed by the
+    /// file.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -45,7 +46,7 @@ impl Bytes {
         Ok(bytes)
     }
 
-    /// So many bytes; `None` if the file ends before.
+    /// `N` bytes; `None` if the file ends before.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -53,7 +54,7 @@ impl Bytes {
         Ok(self.take(N as u64)?.try_into().ok())
     }
 
-    /// Leaves out bytes; whether all were there.
+    /// Skips bytes; returns whether all were there.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -79,7 +80,7 @@ pub(super) enum Number {
 }
 
 impl Number {
-    /// Bytes of one.
+    /// Size in bytes.
     pub(super) fn width(self) -> usize {
         match self {
             Self::Signed(width) | Self::Unsigned(width) => width,
@@ -88,7 +89,7 @@ impl Number {
         }
     }
 
-    /// The number in as many bytes as it has.
+    /// Decodes a number from bytes of its size.
     pub(super) fn read(self, bytes: &[u8], order: Order) -> f64 {
         let mut wide = [0; 8];
         let width = self.width().min(bytes.len());
@@ -111,7 +112,7 @@ impl Number {
         }
     }
 
-    /// All numbers in bytes; what is left of one at the end is none.
+    /// Decodes all numbers in bytes; an incomplete one at the end is ignored.
     pub(super) fn all(self, bytes: &[u8], order: Order) -> Vec<f64> {
         let each = bytes.chunks_exact(self.width());
         each.map(|bytes| self.read(bytes, order)).collect()

@@ -1,5 +1,5 @@
-//! MATLAB 5 files (`save -v6` and `-v7`, SciPy's `savemat`): real numeric vectors are channels, a vector named as time is their
-//! axis, and a number named as a rate or a step their rate (MAT-File Format, MathWorks).
+//! MATLAB 5 files (`save -v6` and `-v7`, SciPy's `savemat`): real numeric vectors are channels, a vector named like
+//! time is their axis, and a number named like a rate or step their rate (MAT-File Format, MathWorks).
 
 use std::io::Cursor;
 
@@ -20,22 +20,22 @@ pub(super) const MATLAB: Format = Format {
     read,
 };
 
-/// Bytes of the head of a file.
+/// Size of the file header in bytes.
 const HEAD: u64 = 128;
 /// Types of elements.
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
-/// Bits of the flags of an array.
+/// Bits of the array flags.
 const COMPLEX: u32 = 1 << 11;
 
 fn is(head: &[u8]) -> bool {
     let is_version = |end: &[u8]| end == b"\0\x01IM" || end == b"\x01\0MI";
     head.starts_with(b"MATLAB 5") && head.get(124..128).is_some_and(is_version)
-        // SciPy and others may leave the text out.
+        // SciPy and others may omit the text.
         || head.get(124..128).is_some_and(is_version) && head.iter().take(4).all(|b| *b != 0)
 }
 
-/// A variable of numbers.
+/// A numeric variable.
 struct Variable {
     name: String,
     values: Vec<f64>,
@@ -43,7 +43,7 @@ struct Variable {
     is_vector: bool,
 }
 
-/// An element: its type, its bytes, and whether they are all there.
+/// An element: its type, its bytes, and whether they are complete.
 struct Element {
     kind: u32,
     at: u64,
@@ -51,7 +51,7 @@ struct Element {
     is_whole: bool,
 }
 
-/// Reads an element; `None` at the end. Those in others are filled up to eight bytes.
+/// Reads an element; `None` at the end. Nested elements are padded to eight bytes.
 fn element(
     bytes: &mut Bytes,
     order: Order,
@@ -70,7 +70,7 @@ fn element(
     let word = |from: usize| Number::Unsigned(4).read(&head[from..from + 4], order) as u32;
     let (kind, at) = (word(0), bytes.at);
     if kind >> 16 != 0 {
-        // A short one has its length in the upper half and its bytes in the second word.
+        // A short element has its length in the upper half and its bytes in the second word.
         let count = ((kind >> 16) as usize).min(4);
         return Ok(Some(Element {
             kind: kind & 0xffff,
@@ -92,7 +92,7 @@ fn element(
     }))
 }
 
-/// The numbers of an element of that type.
+/// Numeric type of an element.
 fn number(kind: u32) -> Option<Number> {
     Some(match kind {
         1 => Number::Signed(1),
@@ -109,7 +109,7 @@ fn number(kind: u32) -> Option<Number> {
     })
 }
 
-/// What a matrix is: numbers, or why it is none.
+/// Content of a matrix: numbers, or the reason why not.
 enum Matrix {
     Numbers(Variable),
     Other { name: String, why: &'static str },
@@ -187,7 +187,7 @@ fn read(bytes: &mut Bytes, reading: &Reading) -> Result<Content, Failure> {
             continue;
         }
         match matrix(&mut inner, order)? {
-            // Of SciPy and MATLAB, what belongs to objects has no name.
+            // In SciPy and MATLAB files, the data of objects have no name.
             Some(Matrix::Other { name, .. }) if name.is_empty() || name.starts_with("__") => {}
             Some(Matrix::Other { name, why }) => left_out.push(format!("\"{name}\" ({why})")),
             Some(Matrix::Numbers(variable)) => variables.push(variable),
@@ -202,7 +202,7 @@ fn read(bytes: &mut Bytes, reading: &Reading) -> Result<Content, Failure> {
     Ok(content)
 }
 
-/// Unpacks a compressed element: its type and its content.
+/// Decompresses an element: its type and its content.
 fn inflated(packed: Element, order: Order) -> Result<(u32, Bytes), Failure> {
     let unpacked = flate2::read::ZlibDecoder::new(Cursor::new(packed.bytes));
     let mut unpacked = Bytes::new(Box::new(unpacked));
@@ -216,7 +216,7 @@ fn inflated(packed: Element, order: Order) -> Result<(u32, Bytes), Failure> {
     }
 }
 
-/// Words for a number that is a rate, or a step.
+/// Names of numbers that are a rate or a step.
 const RATES: [&str; 9] = [
     "fs",
     "rate",
@@ -243,7 +243,7 @@ fn bare(name: &str) -> String {
     letters.collect::<String>().to_lowercase()
 }
 
-/// The rate that a number with such a name gives, and the name.
+/// The rate given by a number with such a name, and the name.
 fn stated_rate(variables: &[Variable]) -> Result<Option<(String, f64)>, Failure> {
     let scalars = variables.iter().filter(|v| v.values.len() == 1);
     let stated = scalars.filter_map(|v| {
@@ -280,7 +280,7 @@ fn stated_rate(variables: &[Variable]) -> Result<Option<(String, f64)>, Failure>
     }
 }
 
-/// The place of the vector of time: the one that is named, or the only one with a name of time.
+/// Index of the time vector: the requested one, or the only one with a name of time.
 fn time_of(variables: &[Variable], reading: &Reading) -> Result<Option<usize>, Failure> {
     let is_column = |v: &Variable| v.is_vector && v.values.len() > 1;
     if let Some(wanted) = &reading.time_column {
@@ -314,7 +314,7 @@ fn time_of(variables: &[Variable], reading: &Reading) -> Result<Option<usize>, F
     })
 }
 
-/// Makes channels of the vectors.
+/// Converts the vectors to channels.
 fn channels(
     mut variables: Vec<Variable>,
     reading: &Reading,
@@ -356,13 +356,13 @@ fn channels(
     Ok(())
 }
 
-/// The unit at the end of a name, as `bridge_V` has it.
+/// The unit at the end of a name, as in `bridge_V`.
 fn unit_in(name: &str) -> Option<&str> {
     let (_, unit) = name.rsplit_once('_')?;
     NamedUnit::parse(unit).map(|_| unit)
 }
 
-/// The axis of a vector of time.
+/// The axis of a time vector.
 fn seconds(time: &Variable, reading: &Reading) -> Result<TimeAxis, Failure> {
     let (unit, is_given) = match (&reading.time_unit, unit_in(&time.name)) {
         (Some(unit), _) => (Some(unit.as_str()), true),

@@ -1,7 +1,7 @@
-//! Recordings that are neither text of a table nor MCAP, told by their first bytes: one format a file.
+//! Recordings other than text tables and MCAP, recognised by their first bytes: one file per format.
 //!
-//! Each reads a file from front to end into channels with names, units, rates and samples. To add one, write its file and a
-//! line in `FORMATS`.
+//! Each reader converts a file sequentially into channels with names, units, rates and samples. To add one, write its
+//! file and a line in `FORMATS`.
 
 mod bag;
 mod bytes;
@@ -21,10 +21,10 @@ use crate::io::{ChannelChoice, Reading, names_compensated};
 use crate::unit::{NamedUnit, OF_FULL_SCALE};
 use crate::warning::Warning;
 
-/// Most channels that a warning names.
+/// Maximum number of channels listed in a warning.
 const NAMED: usize = 10;
 
-/// Says which channels were left out, each with the reason, if any were.
+/// Warning about channels that were left out, each with the reason.
 fn names_left_out(mut left_out: Vec<String>) -> Option<Warning> {
     if left_out.is_empty() {
         return None;
@@ -42,16 +42,16 @@ fn names_left_out(mut left_out: Vec<String>) -> Option<Warning> {
 pub(crate) struct Format {
     /// As in the key `format` of a report.
     name: &'static str,
-    /// Name for people, with an article: `a WAV file`.
+    /// Name for messages, with an article: `a WAV file`.
     called: &'static str,
-    /// Whether a file that begins so is one.
+    /// Whether a file with these first bytes has this format.
     is: fn(&[u8]) -> bool,
-    /// Options beside those of any recording that apply to it.
+    /// Accepted options in addition to those of any recording.
     takes: &'static [&'static str],
     read: fn(&mut Bytes, &Reading) -> Result<Content, Failure>,
 }
 
-/// All of them.
+/// All formats.
 const FORMATS: [&Format; 5] = [
     &wave::WAVE,
     &universal::UNIVERSAL,
@@ -60,20 +60,20 @@ const FORMATS: [&Format; 5] = [
     &bag::BAG,
 ];
 
-/// The format of a file that begins so, if it is one of these.
+/// The format of a file with these first bytes, if it is one of these.
 pub(crate) fn of(head: &[u8]) -> Option<&'static Format> {
     FORMATS.into_iter().find(|format| (format.is)(head))
 }
 
-/// Whether a file of a folder that begins so is a recording of one of them, and not only refused with advice.
+/// Whether a file with these first bytes is a readable recording, rather than one rejected with advice.
 pub(crate) fn is_recording(head: &[u8]) -> bool {
     of(head).is_some_and(|format| format.name != bag::BAG.name)
 }
 
-/// Refuses a unit for fractions of full scale: it alone does not say what they are.
+/// Rejects a unit for fractions of full scale, as it does not define the scale.
 ///
 /// # Errors
-/// If one is given.
+/// If a unit is given.
 pub(super) fn refuse_unit_of_fraction(
     channel: &Channel,
     choice: &ChannelChoice,
@@ -93,24 +93,24 @@ pub(super) fn refuse_unit_of_fraction(
     ))
 }
 
-/// What is in a file.
+/// Content of a file.
 #[derive(Default)]
 struct Content {
-    /// How it is written, for people.
+    /// Description of the encoding, for messages.
     dialect: String,
-    /// What its head says besides, as pairs of key and value.
+    /// Further header entries, as pairs of key and value.
     details: Vec<(String, String)>,
     channels: Vec<Channel>,
     warnings: Vec<Warning>,
-    /// What was announced, but is not there.
+    /// Announced but missing data.
     lost: Option<Warning>,
 }
 
 impl Format {
-    /// Reads a file; `source` is its name for people.
+    /// Reads a file; `source` is its name for messages.
     ///
     /// # Errors
-    /// If it cannot be read, or has no channel.
+    /// If it cannot be read, or contains no channel.
     pub(super) fn read(
         &self,
         source: &str,
@@ -141,7 +141,7 @@ impl Format {
         })
     }
 
-    /// Refuses options that apply to other formats only.
+    /// Rejects options for other formats.
     fn refuse_others(&self, reading: &Reading) -> Result<(), Failure> {
         let given = [
             ("--delimiter", reading.dialect.delimiter.is_some()),
@@ -155,7 +155,7 @@ impl Format {
     }
 }
 
-/// A channel as a file of these formats has it.
+/// A channel of these formats.
 fn channel(name: &str, unit_text: Option<&str>, samples: Vec<f64>, axis: TimeAxis) -> Channel {
     let mut samples = samples;
     let mut holes = Vec::new();
@@ -184,7 +184,7 @@ fn channel(name: &str, unit_text: Option<&str>, samples: Vec<f64>, axis: TimeAxi
     }
 }
 
-/// The axis of stamps in seconds, if all are numbers.
+/// The axis of stamps in seconds, if all are finite.
 fn stamped(heading: &str, stamps_s: Vec<f64>) -> TimeAxis {
     let mut axis = TimeAxis::of_stamps(heading, Arc::new(stamps_s));
     let stamps = axis.stamps_s.iter().flat_map(|stamps| stamps.iter());
@@ -199,12 +199,12 @@ fn stamped(heading: &str, stamps_s: Vec<f64>) -> TimeAxis {
     axis
 }
 
-/// A rate that a file states, if a clock can have it.
+/// A stated rate, if it is plausible for a clock.
 fn plausible_rate(rate_hz: f64) -> Option<f64> {
     (1e-12..=1e15).contains(&rate_hz).then_some(rate_hz)
 }
 
-/// A file that ends before what it announces.
+/// Warning about a file that ends before its announced length.
 fn cut(what: &str) -> Warning {
     Warning::new(
         "file-cut",
@@ -212,7 +212,7 @@ fn cut(what: &str) -> Warning {
     )
 }
 
-/// A file whose content contradicts itself.
+/// Failure for a file with inconsistent content.
 fn damaged(what: impl std::fmt::Display, at: u64) -> Failure {
     Failure::failed(
         ErrorCode::DamagedFile,

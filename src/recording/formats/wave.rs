@@ -1,6 +1,7 @@
-//! WAV: RIFF with PCM of 8 to 32 bits or floating point, and its long forms RF64 and BW64 (EBU Tech 3306, ITU-R BS.2088).
+//! WAV: RIFF with PCM of 8 to 32 bits or floating point, and its 64-bit forms RF64 and BW64 (EBU Tech 3306, ITU-R
+//! BS.2088).
 //!
-//! Samples are fractions of full scale. What full scale is, no field says: `--full-scale "10 V"` does.
+//! Samples are fractions of full scale, which no field defines: `--full-scale "10 V"` does.
 
 use super::bytes::{Bytes, Number, Order};
 use super::{Content, Format, channel, cut, damaged, plausible_rate};
@@ -18,9 +19,9 @@ pub(super) const WAVE: Format = Format {
     read,
 };
 
-/// Length of data that a recorder did not fill in, or that stands in a chunk `ds64`.
+/// Data length not filled in by a recorder, or given in a chunk `ds64`.
 const UNKNOWN: u32 = u32::MAX;
-/// Longest chunk that is no data and is kept in memory.
+/// Maximum size of a non-data chunk kept in memory.
 const LONGEST_CHUNK: u64 = 1 << 16;
 
 fn is(head: &[u8]) -> bool {
@@ -30,10 +31,10 @@ fn is(head: &[u8]) -> bool {
     is_riff && head.get(8..12) == Some(b"WAVE")
 }
 
-/// How samples are stored.
+/// Storage of samples.
 struct Layout {
     number: Number,
-    /// What a sample of full scale is as a number, and what zero is.
+    /// Numeric value of full scale, and of zero.
     full: f64,
     zero: f64,
     channels: usize,
@@ -42,7 +43,7 @@ struct Layout {
 }
 
 impl Layout {
-    /// Reads a chunk `fmt `.
+    /// Parses a chunk `fmt `.
     fn of(chunk: &[u8], at: u64) -> Result<Self, Failure> {
         let u16_at = |place: usize| {
             let bytes = chunk.get(place..place + 2)?;
@@ -56,7 +57,7 @@ impl Layout {
         let block = usize::from(u16_at(12).ok_or_else(short)?);
         let bits = usize::from(u16_at(14).ok_or_else(short)?);
         if tag == 0xfffe {
-            // The format proper begins the identifier of an extensible one.
+            // An extensible header starts its identifier with the actual format.
             tag = u16_at(24).ok_or_else(short)?;
         }
         let width = block.checked_div(channels).unwrap_or(0);
@@ -92,7 +93,7 @@ impl Layout {
         })
     }
 
-    /// Bytes of a sample of all channels.
+    /// Size in bytes of one sample of all channels.
     fn frame(&self) -> usize {
         self.number.width() * self.channels
     }
@@ -141,7 +142,7 @@ fn read(bytes: &mut Bytes, reading: &Reading) -> Result<Content, Failure> {
     }
 }
 
-/// Reads the samples, of a length that is known or up to the end of the file.
+/// Reads the samples, of known length or up to the end of the file.
 fn data(
     bytes: &mut Bytes,
     layout: &Layout,

@@ -1,8 +1,8 @@
-//! Names of columns that hold time, the horizontal axis, or the number of the sample.
+//! Names of columns with time, the horizontal axis, or the sample number.
 
 use super::vocabulary::has;
 
-/// Whether a name stands for time, or for the axis that is time in a recorder's export.
+/// Whether a name means time, or the axis that is time in a recorder's export.
 #[must_use]
 pub fn is_time_name(name: &str) -> bool {
     // Us and Ms are a voltage and a torque.
@@ -20,7 +20,7 @@ pub fn is_time_name(name: &str) -> bool {
             .trim_end_matches(|c: char| c.is_ascii_digit());
         let is_compound = (stem.ends_with("zeit") || stem.ends_with("time"))
             && !["lifetime", "risetime", "deadtime", "totzeit", "overtime"].contains(&stem);
-        // t5 beside other words is no time.
+        // t5 next to other words is not time.
         let is_known = has("time", stem) && (stem != "t" || word == "t");
         is_known || is_compound
     };
@@ -39,7 +39,7 @@ pub fn is_time_name(name: &str) -> bool {
     }
 }
 
-/// A name with a space before a unit of time that is joined to time: `TimeMs`, `timeMillis`.
+/// A name with a space inserted before a unit of time joined to time: `TimeMs`, `timeMillis`.
 #[must_use]
 pub fn spaced(name: &str) -> String {
     const UNITS: [&str; 9] = [
@@ -54,8 +54,8 @@ pub fn spaced(name: &str) -> String {
     parts.unwrap_or_else(|| name.to_owned())
 }
 
-/// Whether a name is that of a time or of a temperature or torque, as `T`, `T1` and `t2` are: its place
-/// and its values must tell.
+/// Whether a name means time or a temperature or torque, like `T`, `T1` and `t2`: position and values
+/// must decide.
 #[must_use]
 pub fn is_weak_time_name(name: &str) -> bool {
     let name = name.trim();
@@ -63,8 +63,8 @@ pub fn is_weak_time_name(name: &str) -> bool {
     stem == "T" || stem == "t" && stem.len() < name.len()
 }
 
-/// The word in a name that stands for time, in lower case and without digits: that of columns of time
-/// which belong together, as `Time1` and `Time2` do.
+/// The word in a name that means time, in lower case and without digits, common to time columns that
+/// belong together, like `Time1` and `Time2`.
 #[must_use]
 pub fn time_stem(name: &str) -> Option<String> {
     let is_word = |c: char| c.is_alphanumeric() || c == '%';
@@ -81,13 +81,13 @@ pub fn time_stem(name: &str) -> Option<String> {
         .map(stem)
 }
 
-/// Whether a name stands for the horizontal axis, which is time unless the file says otherwise.
+/// Whether a name means the horizontal axis, which is time unless the file says otherwise.
 #[must_use]
 pub fn is_axis_name(name: &str) -> bool {
     has("axis", name.trim().to_lowercase().as_str())
 }
 
-/// Whether a name stands for a number that counts samples.
+/// Whether a name means a sample index.
 #[must_use]
 pub fn is_index_name(name: &str) -> bool {
     let name = name.trim().trim_matches('"').to_lowercase();

@@ -1,4 +1,4 @@
-//! Blocks of rows below each other: where one ends and the next begins.
+//! Consecutive blocks of rows: detection of their ends.
 
 use super::axes::Role;
 use super::cell::Cell;
@@ -8,32 +8,32 @@ use super::keys::{self, Entry, Topic};
 use super::rows::{ColumnKind, Rows};
 use crate::recording::text::dialect::Dialect;
 
-/// Most blocks under the same headings.
+/// Maximum number of blocks under the same headings.
 const MOST: usize = 1000;
-/// How near to its start time begins anew, as a part of the time since.
+/// Distance from its start at which time restarts, relative to the elapsed time.
 const NEAR: f64 = 0.1;
 
 /// What ends a table before the end of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableEnd {
-    /// The line of its headings, if it stands there again.
+    /// The line of its headings, if repeated.
     pub names: Option<String>,
-    /// Keys of its head that are about channels or their rate: with one of them another table begins.
+    /// Header keys about channels or their rate, any of which starts another table.
     pub keys: Vec<String>,
-    /// How lines begin that end it.
+    /// Starts of lines that end it.
     pub marks: &'static [&'static str],
-    /// How keys and values are parted.
+    /// Separation of keys and values.
     pub dialect: Dialect,
 }
 
 impl TableEnd {
-    /// What ends a table under a head.
+    /// What ends a table under a header.
     pub fn of(header: &Header, kinds: &[ColumnKind], dialect: Dialect) -> Self {
         let mut entries = header.entries.clone();
         if let Some(names) = &header.names {
             entries.extend(keys::entries(0, names, dialect));
         }
-        // Rows that begin with a text look like keys themselves.
+        // Rows that begin with text look like keys themselves.
         let is_named = kinds.first() == Some(&ColumnKind::Nothing);
         entries.retain(|entry| is_of_block(entry) && !is_named);
         Self {
@@ -44,7 +44,7 @@ impl TableEnd {
         }
     }
 
-    /// Marks of a maker.
+    /// A maker's marks.
     pub fn of_marks(marks: &'static [&'static str], dialect: Dialect) -> Self {
         Self {
             names: None,
@@ -54,7 +54,7 @@ impl TableEnd {
         }
     }
 
-    /// Whether a table ends before a line that is no plain row.
+    /// Whether a table ends before a line that is not a plain row.
     pub fn is_at(&self, line: &str) -> bool {
         is_end(line)
             || self.are_names(line)
@@ -62,7 +62,7 @@ impl TableEnd {
             || self.begins_anew(line)
     }
 
-    /// Whether a line heads the columns again, perhaps in other units: as many cells, of which the first is the same.
+    /// Whether a line repeats the column headings, possibly with other units: as many cells, the first of them equal.
     fn are_names(&self, line: &str) -> bool {
         let Some(names) = self.names.as_deref() else {
             return false;
@@ -78,7 +78,8 @@ impl TableEnd {
             && cells.iter().all(is_text)
     }
 
-    /// Whether a line repeats a key of the head: there a block of its own begins, with its own head.
+    /// Whether a line repeats a key of the header, so that a separate block with its own header
+    /// begins.
     pub fn begins_anew(&self, line: &str) -> bool {
         let is_text = |c: char| c.is_alphabetic() || c == '"';
         if self.keys.is_empty() || !line.trim_start().starts_with(is_text) {
@@ -101,7 +102,7 @@ fn is_of_block(entry: &Entry) -> bool {
     matches!(entry.topic(), Some(Name | Unit | Rate | Interval | Count))
 }
 
-/// The rows at which time begins anew after lines that are no rows, such as empty ones or `# run 2`.
+/// Rows at which time restarts after lines that are not rows, such as empty ones or `# run 2`.
 pub fn restarts(rows: &Rows, kinds: &[ColumnKind], roles: &[Role]) -> Vec<usize> {
     let is_time = |place: &usize| {
         roles[*place] == Role::Time

@@ -1,27 +1,28 @@
-//! What a cell holds: a number (perhaps with a thousands mark), a date or time, a text, nothing.
+//! Content of a cell: a number (possibly with thousands separators), a date or time, a text,
+//! nothing.
 
 use super::clock::Clock;
 use crate::io::number;
 
-/// What a cell holds.
+/// Content of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cell {
     /// A number.
     Number(f64),
-    /// A number with marks between its thousands.
+    /// A number with thousands separators.
     Grouped(f64),
     /// A date, a time of day, or both.
     Clock(Clock),
     /// NaN, infinity and the like.
     NonFinite,
-    /// Nothing.
+    /// Empty.
     Empty,
     /// Anything else.
     Text,
 }
 
 impl Cell {
-    /// Reads a cell; quotes and spaces around it have been taken off.
+    /// Parses a cell without surrounding quotes and spaces.
     #[must_use]
     pub fn read(text: &str, decimal: u8) -> Self {
         if text.is_empty() {
@@ -36,7 +37,7 @@ impl Cell {
         if let Some(value) = number::cell(text, decimal) {
             return Self::Number(value);
         }
-        // + 0.123, as Graphtec writes it.
+        // + 0.123, as written by Graphtec.
         if let Some(rest) = text
             .strip_prefix(['+', '-'])
             .filter(|rest| rest.starts_with(' '))
@@ -57,7 +58,7 @@ impl Cell {
         Clock::parse(text).map_or(Self::Text, Self::Clock)
     }
 
-    /// Whether it can stand in a row of data.
+    /// Whether it can be part of a data row.
     #[must_use]
     pub fn is_datum(self) -> bool {
         !matches!(self, Self::Text | Self::Empty)
@@ -70,9 +71,9 @@ impl Cell {
     }
 }
 
-/// A number with the minus sign of typesetters (U+2212) or an en dash in its place: `−0.5`, `1.5e–03`.
+/// A number with a typographic minus sign (U+2212) or an en dash: `−0.5`, `1.5e–03`.
 fn with_plain_minus(text: &str) -> Option<String> {
-    // As nearly every cell is.
+    // As in nearly every cell.
     if text.is_ascii() {
         return None;
     }
@@ -89,7 +90,7 @@ fn with_plain_minus(text: &str) -> Option<String> {
     (plain != text).then_some(plain)
 }
 
-/// What spelling of numbers keeps time stamps from being taken over as they stand.
+/// Number format that prevents time stamps from being copied verbatim.
 #[must_use]
 pub fn foreign_spelling(stamps: &[f64], text: &[u8]) -> Option<&'static str> {
     if has_fortran_exponent(text) {
@@ -99,14 +100,14 @@ pub fn foreign_spelling(stamps: &[f64], text: &[u8]) -> Option<&'static str> {
     (is_negative && has_typeset_minus(text)).then_some("its time stamps have a typeset minus")
 }
 
-/// Whether some number may have a minus sign of typesetters, which no result may take over.
+/// Whether some number may have a typographic minus sign, which must not be copied to a result.
 fn has_typeset_minus(text: &[u8]) -> bool {
     let spellings = [&b"\xE2\x88\x92"[..], b"\xE2\x80\x93", b"\x96"];
     let mut spellings = spellings.into_iter();
     spellings.any(|minus| memchr::memmem::find(text, minus).is_some())
 }
 
-/// Whether some number has an exponent of Fortran (`1.5D-03`), which no result may take over.
+/// Whether some number has a Fortran exponent (`1.5D-03`), which must not be copied to a result.
 fn has_fortran_exponent(text: &[u8]) -> bool {
     let is_exponent = |part: &[u8]| {
         matches!(part, [before, b'D' | b'd', b'+' | b'-', after]
@@ -115,14 +116,14 @@ fn has_fortran_exponent(text: &[u8]) -> bool {
     text.windows(4).any(is_exponent)
 }
 
-/// Whether a cell says that there is no number: NaN, infinity and their Windows spellings.
+/// Whether a cell means not-a-number: NaN, infinity and their Windows spellings.
 fn is_not_a_number(cell: &str) -> bool {
     const WORDS: [&str; 6] = ["nan", "inf", "infinity", "1.#qnan", "1.#ind", "1.#inf"];
     let text = cell.trim_start_matches(['+', '-']);
     WORDS.iter().any(|word| text.eq_ignore_ascii_case(word))
 }
 
-/// `1.5D-03`, as programs in Fortran write numbers of double precision.
+/// `1.5D-03`, as written by Fortran programs in double precision.
 fn fortran(text: &str, decimal: u8) -> Option<f64> {
     let (mantissa, exponent) = text.split_once(['D', 'd'])?;
     let ends_in_digit = mantissa.ends_with(|c: char| c.is_ascii_digit() || c == '.');
@@ -136,7 +137,7 @@ fn fortran(text: &str, decimal: u8) -> Option<f64> {
     number::cell(&format!("{mantissa}e{exponent}"), decimal)
 }
 
-/// Ways to say that there is no number, besides those of floating point: over range, no value.
+/// Texts for missing numbers other than those of floating point: over range, no value.
 pub fn is_non_finite(text: &str) -> bool {
     const WORDS: [&str; 37] = [
         "burnout",
@@ -186,7 +187,7 @@ pub fn is_non_finite(text: &str) -> bool {
         || is_over_range(text)
 }
 
-/// Whether a cell holds a number with which instruments say that they have none.
+/// Whether a cell contains a number that instruments use for a missing value.
 #[must_use]
 pub fn is_instruments_mark(text: &str) -> bool {
     let plain = text.replace(',', ".");
@@ -194,13 +195,13 @@ pub fn is_instruments_mark(text: &str) -> bool {
         && plain.parse().is_ok_and(number::is_instruments_mark)
 }
 
-/// `+++++++` and `-------`, as Graphtec writes what lies beyond the range.
+/// `+++++++` and `-------`, as written by Graphtec for out-of-range values.
 fn is_over_range(text: &str) -> bool {
     let all = |sign: u8| text.len() > 3 && text.bytes().all(|byte| byte == sign);
     all(b'+') || all(b'-')
 }
 
-/// A number too large for an `f64`, such as 1e999.
+/// A number that overflows an `f64`, such as 1e999.
 fn exceeds(text: &str) -> bool {
     text.as_bytes()
         .iter()
@@ -211,8 +212,9 @@ fn exceeds(text: &str) -> bool {
             .is_ok_and(f64::is_infinite)
 }
 
-/// A number whose thousands are marked: `1,234.5`, `1.234,5`, `1'234`, `1 234`. The first group does
-/// not begin with a zero and has up to three digits, the others have three, all marks are the same.
+/// A number with thousands separators: `1,234.5`, `1.234,5`, `1'234`, `1 234`. The first group does
+/// not begin with zero and has up to three digits, the others have three, and all separators are the
+/// same.
 fn grouped(text: &str, decimal: u8) -> Option<f64> {
     let body = text.trim_start_matches(['+', '-']);
     let end = body

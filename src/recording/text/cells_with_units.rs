@@ -1,4 +1,4 @@
-//! Columns whose cells hold a unit behind each number: `0.53 V`, `12 mV`.
+//! Columns whose cells contain a unit after each number: `0.53 V`, `12 mV`.
 
 use super::cell::Cell;
 use super::head::{Head, Table};
@@ -9,16 +9,16 @@ use crate::warning::Warning;
 /// Code of the warning that such a column was left out.
 pub(in crate::recording) const CODE: &str = "cells-with-units";
 
-/// The unit behind the number that a cell holds.
+/// The unit after the number in a cell.
 ///
-/// Only a unit that is known counts: `12 pieces` and `B12` are texts.
+/// Only known units count: `12 pieces` and `B12` are texts.
 pub fn unit_of_cell(cell: &str, decimal: u8) -> Option<&str> {
     let cell = cell.trim();
     let is_digit = |c: char| c.is_ascii_digit() || c == '.';
     let ends = cell
         .match_indices(is_digit)
         .map(|(at, digit)| at + digit.len());
-    // The exponent belongs to the number, so that the longest one counts.
+    // The exponent belongs to the number, so the longest match counts.
     let end = ends
         .rev()
         .find(|end| Cell::read(cell[..*end].trim(), decimal).is_number())?;
@@ -26,7 +26,7 @@ pub fn unit_of_cell(cell: &str, decimal: u8) -> Option<&str> {
     (!unit.is_empty() && units::read(unit).is_some()).then_some(unit)
 }
 
-/// The warnings about the columns whose first cell is a number with its unit; `first` is the first row.
+/// Warnings about columns whose first cell is a number with a unit; `first` is the first row.
 pub fn left_out(head: &Head, table: &Table, first: usize, header: &Header) -> Vec<Warning> {
     let cells = table.dialect.cells(&head.lines[first].text);
     let fields = header.fields.iter().zip(&cells).enumerate();

@@ -1,4 +1,4 @@
-//! Reading a stream in pieces that end with whole lines.
+//! Reading of a stream in pieces of whole lines.
 
 use std::io::{self, Read};
 
@@ -9,35 +9,35 @@ use crate::warning::Warning;
 /// Longest line that is accepted.
 pub const LONGEST_LINE: usize = 1 << 24;
 
-/// The refusal of a line beyond [`LONGEST_LINE`].
+/// Failure for a line longer than [`LONGEST_LINE`].
 pub fn too_long_a_line() -> Failure {
     Failure::failed(
         ErrorCode::NotARecording,
         "a line is longer than 16 MiB: this is no table of numbers",
     )
 }
-/// Bytes of a piece: large enough to be quick, small enough to stay in cache.
+/// Bytes per piece: large enough to be fast, small enough to stay in cache.
 const PIECE: usize = 1 << 17;
 
-/// Cuts a stream into pieces of whole lines.
+/// Splits a stream into pieces of whole lines.
 pub struct Chunks {
     input: Box<dyn Read + Send>,
-    /// What was read and not handed out: the head of the file, the start of a line.
+    /// Read but not yet output: the head of the file, the start of a line.
     carry: Vec<u8>,
     size: usize,
     at_end: bool,
-    /// Number and text of a last line without a line end, where all was taken.
+    /// Number and text of a last line without a line end, if all was taken.
     unended: Option<(usize, String)>,
 }
 
-/// What a piece is.
+/// Kind of a piece.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Piece {
-    /// Whole lines, each ended.
+    /// Whole lines, each with a line end.
     Lines,
     /// The last piece, whose last line has no line feed.
     Unended,
-    /// There is nothing left.
+    /// No more input.
     End,
 }
 
@@ -54,13 +54,12 @@ impl Chunks {
         }
     }
 
-    /// Makes the pieces at least so long.
+    /// Sets the minimum size of the pieces.
     pub fn set_size(&mut self, bytes: usize) {
         self.size = bytes.max(PIECE);
     }
 
-    /// The next bytes, as many as there are up to `count`, and whether there are no more. They stay the
-    /// next ones.
+    /// Peeks at the next bytes, up to `count`, and reports whether there are no more.
     ///
     /// # Errors
     /// Those of the input.
@@ -76,7 +75,7 @@ impl Chunks {
         Ok((&self.carry[..end], is_all))
     }
 
-    /// All bytes that are left.
+    /// All remaining bytes.
     ///
     /// # Errors
     /// Those of the input.
@@ -92,18 +91,18 @@ impl Chunks {
         Ok(text)
     }
 
-    /// A warning of a last line without a line end, where all was taken and the other lines have one.
+    /// A warning about a last line without a line end, if all was taken and the other lines have one.
     pub fn unended_line(&self) -> Option<Warning> {
         let (number, line) = self.unended.as_ref()?;
         LastLine::Suspect.warning(&format!("line {number}"), line)
     }
 
-    /// Leaves out bytes that were looked at.
+    /// Skips bytes that were peeked at.
     pub fn skip(&mut self, count: usize) {
         self.carry.drain(..count);
     }
 
-    /// Makes bytes of the last piece the next ones again.
+    /// Puts bytes of the last piece back.
     pub fn put_back(&mut self, rest: &[u8]) {
         self.carry.splice(0..0, rest.iter().copied());
     }
@@ -111,16 +110,17 @@ impl Chunks {
     /// Fills `piece` with the next whole lines.
     ///
     /// # Errors
-    /// Those of the input, and a line beyond 16 MiB.
+    /// Those of the input, and a line longer than 16 MiB.
     pub fn next(&mut self, piece: &mut Vec<u8>) -> Result<Piece, Failure> {
-        // What is carried may be more than one piece: the head of the file.
+        // The carry may be more than one piece: the head of the file.
         let carried = self.carry.len().min(self.size);
         if piece.len() < carried {
             piece.resize(carried, 0);
         }
         piece[..carried].copy_from_slice(&self.carry[..carried]);
         self.carry.drain(..carried);
-        // Old bytes behind it are kept for now: they need not be cleared to be read over.
+        // Old bytes after it are kept for now, as they need not be cleared before being
+        // overwritten.
         let mut filled = carried;
         loop {
             if self.carry.is_empty() {
@@ -154,7 +154,7 @@ impl Chunks {
         }
     }
 
-    /// Reads behind the first `filled` bytes until the piece is full or the input ends.
+    /// Appends to the first `filled` bytes until the piece is full or the input ends.
     fn fill(&mut self, piece: &mut Vec<u8>, mut filled: usize) -> io::Result<()> {
         piece.resize(self.size.max(filled), 0);
         while !self.at_end && filled < piece.len() {

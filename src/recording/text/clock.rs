@@ -1,12 +1,12 @@
-//! Dates and times of day as recorders write them: `12:34:56.789`, `2026-03-26T14:34:31Z`,
-//! `26.03.2026 14:34:31,5`, `3/26/2026 2:34:31 PM`, `26-Mar-2026`; times since a start with days, `0 days 00:00:01.5`.
+//! Dates and times of day as written by recorders: `12:34:56.789`, `2026-03-26T14:34:31Z`, `26.03.2026 14:34:31,5`,
+//! `3/26/2026 2:34:31 PM`, `26-Mar-2026`; times since a start with days, `0 days 00:00:01.5`.
 //!
-//! Only differences are used, so a time zone counts only where it changes within a record, and the order of day and month
-//! between slashes matters only where both are at most 12 (then the month is taken to be first).
+//! Only differences are used, so a time zone matters only if it changes within a record, and the order of day and month
+//! between slashes only if both are at most 12 (the month is then taken to be first).
 
 use crate::recording::moment::date_and_time;
 
-/// Seconds since 1970 from 2001 to 2128.
+/// Seconds since 1970, for 2001 to 2128.
 pub const EPOCH_S: std::ops::Range<f64> = 1e9..5e9;
 /// Nanoseconds of a second.
 const SECOND: i64 = 1_000_000_000;
@@ -20,19 +20,19 @@ pub struct Clock {
     pub day: Option<i32>,
     /// Nanoseconds since midnight.
     pub nanoseconds: Option<i64>,
-    /// Seconds that its time zone is ahead of UTC, if it says so.
+    /// Offset of its time zone from UTC in seconds, if given.
     pub ahead_s: Option<i32>,
 }
 
 const MONTHS: [&str; 12] = [
     "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
 ];
-/// Months that German shortens otherwise.
+/// Months with other German abbreviations.
 const GERMAN_MONTHS: [(&str, u32); 4] = [("mär", 3), ("mrz", 3), ("mai", 5), ("okt", 10)];
 const GERMAN_DECEMBER: &str = "dez";
 
 impl Clock {
-    /// Reads a cell that holds nothing else.
+    /// Parses a cell that contains nothing else.
     ///
     /// ```
     /// use torqcomp::recording::text::Clock;
@@ -78,7 +78,7 @@ impl Clock {
             })
     }
 
-    /// Reads fourteen digits that are a date and a time, with decimals or without: `20210304235958.05`.
+    /// Parses fourteen digits of a date and time, with or without decimals: `20210304235958.05`.
     #[must_use]
     pub fn compact(text: &str) -> Option<Self> {
         let (whole, decimals) = text.split_once('.').unwrap_or((text, ""));
@@ -97,7 +97,7 @@ impl Clock {
         })
     }
 
-    /// Date and time in a form of ISO 8601, with the zone that is given, if a text can be read in one way only.
+    /// Date and time in an ISO 8601 format, with the given zone, if a text is unambiguous.
     ///
     /// ```
     /// use torqcomp::recording::text::Clock;
@@ -122,7 +122,7 @@ impl Clock {
         Some(format!("{}{zone}", without_zeros.trim_end_matches('.')))
     }
 
-    /// The same, or the text as it is written, as where it is of ISO 8601 already.
+    /// The same, or the text as written if it is ISO 8601 already.
     #[must_use]
     pub fn iso_or_as_written(text: &str) -> String {
         let is_iso =
@@ -131,7 +131,8 @@ impl Clock {
         found.unwrap_or_else(|| text.to_owned())
     }
 
-    /// Seconds after another one; at the end of daylight saving, the zone changes between them.
+    /// Seconds after another one; the zone may change between them at the end of daylight saving
+    /// time.
     #[must_use]
     pub fn seconds_after(self, first: Self) -> f64 {
         let zones = self.ahead_s.zip(first.ahead_s);
@@ -145,7 +146,7 @@ impl Clock {
     }
 }
 
-/// Adds a day to times of day whenever they step back by more than half of one: past midnight.
+/// Adds a day to times of day whenever they step back by more than half a day: past midnight.
 pub fn unwrap_midnights(seconds: &mut [f64]) {
     let mut last = f64::NAN;
     for time in seconds.iter_mut().filter(|time| !time.is_nan()) {
@@ -154,7 +155,7 @@ pub fn unwrap_midnights(seconds: &mut [f64]) {
     }
 }
 
-/// Seconds of the days that passed between a time and the first of the times of day after it.
+/// Days, in seconds, between a time and the first of the times of day after it.
 pub fn days_between(last: f64, times: &[f64]) -> f64 {
     const DAY_S: f64 = 86_400.0;
     let first = times.first().copied().unwrap_or(last);
@@ -162,7 +163,7 @@ pub fn days_between(last: f64, times: &[f64]) -> f64 {
     if days > 0.0 { days * DAY_S } else { 0.0 }
 }
 
-/// Whether the order of day and month, or of day and year, cannot be seen: `03/04/2025`, `25-03-14`.
+/// Whether the order of day and month, or of day and year, is ambiguous: `03/04/2025`, `25-03-14`.
 fn is_ambiguous(text: &str) -> bool {
     let Some(mark) = text.chars().find(|c| !c.is_ascii_digit()) else {
         return false;
@@ -181,15 +182,15 @@ fn is_ambiguous(text: &str) -> bool {
     }
 }
 
-/// Whether a text has a mark of dates or times in it, or ends in a year, as `2 May 2022` does.
+/// Whether a text contains a mark of dates or times, or ends in a year, as in `2 May 2022`.
 fn may_be_clock(text: &str) -> bool {
     let is_year = |word: &str| word.len() == 4 && word.bytes().all(|b| b.is_ascii_digit());
     text.contains([':', '-', '.', '/'])
         || text.rsplit_once(' ').is_some_and(|(_, last)| is_year(last))
 }
 
-/// `h:mm:ss`, with decimals after `.`, `,` or `:`, with AM or PM, with a zone; `mm:ss.f`. Beside it, the seconds that the
-/// zone is ahead of UTC.
+/// `h:mm:ss`, with decimals after `.`, `,` or `:`, with AM or PM, with a zone; `mm:ss.f`. Also the offset of the zone
+/// from UTC in seconds.
 fn time_of_day(text: &str) -> Option<(i64, Option<i32>)> {
     let lower = text.to_ascii_lowercase();
     let ((body, ahead_s), half) = match lower.strip_suffix("pm").or(lower.strip_suffix("p.m.")) {
@@ -207,7 +208,7 @@ fn time_of_day(text: &str) -> Option<(i64, Option<i32>)> {
     };
     let (hours, minutes, seconds) = match rest {
         Some(rest) => (first, digits(second, 2..=2)?, rest),
-        // Minutes and seconds only if there are decimals: 12:34 may be either.
+        // Minutes and seconds only with decimals, as 12:34 is ambiguous.
         None if second.contains(['.', ',']) => (0, first, second),
         None => return None,
     };
@@ -221,7 +222,7 @@ fn time_of_day(text: &str) -> Option<(i64, Option<i32>)> {
         Some(_) => return None,
         None => hours,
     };
-    // A counter may run beyond a day; minutes and seconds do not run beyond 60.
+    // Hours may exceed a day; minutes and seconds do not exceed 60.
     if minutes >= 60 || whole > 60 {
         return None;
     }
@@ -242,7 +243,8 @@ fn since_start(text: &str) -> Option<(i64, Option<i32>)> {
     Some((days * DAY + nanoseconds, ahead_s))
 }
 
-/// A text without `Z`, `+02:00`, `-0500` or ` utc` at its end, and the seconds that this is ahead of UTC.
+/// A text without a final `Z`, `+02:00`, `-0500` or ` utc`, and the corresponding offset from UTC in
+/// seconds.
 fn without_zone(text: &str) -> (&str, Option<i32>) {
     let plain = text.trim_end_matches("utc").trim_end_matches("gmt");
     let plain = plain.trim_end().trim_end_matches('z');
@@ -281,7 +283,7 @@ fn digits(text: &str, count: std::ops::RangeInclusive<usize>) -> Option<i64> {
         .then(|| text.parse().ok())?
 }
 
-/// Days since 1970 of a date alone.
+/// Days since 1970 of a date without a time.
 fn date(text: &str) -> Option<i32> {
     // Montag, 2. Mai 2022
     let text = match text.split_once(", ") {
@@ -331,8 +333,8 @@ fn month(text: &str) -> Option<u32> {
     })
 }
 
-/// Days from 1970-01-01 to a day of the Gregorian calendar: 365 for each year, one more for each leap
-/// year before it, and the days of the months before.
+/// Days from 1970-01-01 to a date of the Gregorian calendar: 365 per year, one more per preceding
+/// leap year, and the days of the preceding months.
 fn days(year: i32, month: u32, day: u32) -> Option<i32> {
     const BEFORE: [i32; 12] = [0, 31, 59, 90, 120, 151, 181, 212, 243, 273, 304, 334];
     if !(1..=12).contains(&month) || !(1..=31).contains(&day) || !(1900..=2200).contains(&year) {

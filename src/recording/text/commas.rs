@@ -1,4 +1,4 @@
-//! Decimal commas between commas: `0,001,5,998` for 0,001 and 5,998, a file whose numbers are in pieces.
+//! Decimal commas with comma separators: `0,001,5,998` for 0,001 and 5,998, which splits all numbers.
 
 use super::cell::Cell;
 use super::dialect::is_skipped;
@@ -6,16 +6,16 @@ use super::head::{Head, Table};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Delimiter;
 
-/// Rows that are looked at.
+/// Number of rows examined.
 const ROWS: usize = 400;
-/// Headings and rows that are shown.
+/// Number of characters of headings and rows shown.
 const SHOWN: usize = 60;
 
-/// Refuses rows of decimal commas whose cells are parted by commas too: they have twice as many cells as there are
-/// headings, whole numbers before digits that are no numbers of their own.
+/// Rejects rows of decimal commas with comma-separated cells: twice as many cells as headings, with integers
+/// alternating with digits that are not numbers of their own.
 ///
 /// # Errors
-/// If the rows look so.
+/// If the rows look like that.
 pub(super) fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
     let is_comma =
         table.dialect.delimiter == Delimiter::Byte(b',') && table.dialect.decimal == b'.';
@@ -61,7 +61,7 @@ pub(super) fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
     .line(head.number(table.first)))
 }
 
-/// Texts in the line right above the table, if it holds nothing else.
+/// Number of texts in the line just above the table, if it contains nothing else.
 fn headings(head: &Head, table: &Table) -> Option<usize> {
     let above = head.lines[..table.first].iter().rev();
     let line = above
@@ -79,7 +79,7 @@ fn headings(head: &Head, table: &Table) -> Option<usize> {
     cells.iter().all(is_text).then_some(cells.len())
 }
 
-/// Whether cells are whole numbers and digits by turns.
+/// Whether cells alternate between integers and digits.
 fn is_in_pieces(row: &[String]) -> bool {
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     let is_pair = |pair: &[String]| {
@@ -89,7 +89,8 @@ fn is_in_pieces(row: &[String]) -> bool {
     row.chunks_exact(2).all(is_pair)
 }
 
-/// Whether each second column holds digits behind a mark: always as many, some with zeros before them.
+/// Whether each second column contains digits after a decimal mark: always the same number of them,
+/// some with leading zeros.
 fn are_fractions(rows: &[Vec<String>]) -> bool {
     let Some(first) = rows.first() else {
         return false;

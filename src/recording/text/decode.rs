@@ -1,5 +1,5 @@
-//! Bytes of any encoding and with any line ends as lines of UTF-8 that end with a line feed, piece by
-//! piece. Windows-1252 and UTF-8 stay as they are: [`crate::recording::text::dialect::decode_line`] reads both.
+//! Conversion of any encoding and line end to UTF-8 lines with line feeds, piece by piece. Windows-1252 and
+//! UTF-8 are unchanged: [`crate::recording::text::dialect::decode_line`] reads both.
 
 use std::io::{self, Read};
 
@@ -9,35 +9,35 @@ use super::encoding;
 use crate::failure::{ErrorCode, Failure};
 use crate::warning::Warning;
 
-/// Bytes that are decoded at a time.
+/// Number of bytes decoded at a time.
 const PIECE: usize = 1 << 16;
 const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 
-/// How the bytes of a text are to be read.
+/// Decoding of the bytes of a text.
 #[derive(Debug)]
 pub struct Decoding {
     encoding: Option<&'static Encoding>,
     line_ends: LineEnds,
-    /// What is unusual, for the name of the dialect: `UTF-16 LE`, `lines end with CR`.
+    /// Unusual properties, for the description of the dialect: `UTF-16 LE`, `lines end with CR`.
     pub oddities: Vec<&'static str>,
-    /// What is wrong in the head.
+    /// Warnings about the head.
     pub warnings: Vec<Warning>,
 }
 
-/// What ends the lines.
+/// Line ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum LineEnds {
-    /// LF, or CR LF, which is read like it.
+    /// LF, or CR LF, which is treated like it.
     Lf,
     Cr,
     CrCrLf,
 }
 
 impl Decoding {
-    /// By the first bytes of a file.
+    /// Detects the decoding from the first bytes of a file.
     ///
     /// # Errors
-    /// If it is another format that is often handed over in place of text, or binary.
+    /// If it is another format commonly supplied instead of text, or binary.
     pub fn of(head: &[u8]) -> Result<Self, Failure> {
         let (mut oddities, mut warnings) = (Vec::new(), Vec::new());
         refuse_binary(head)?;
@@ -74,7 +74,7 @@ impl Decoding {
         })
     }
 
-    /// The text of an input whose first bytes were read already.
+    /// The text of an input whose first bytes were already read.
     pub fn reader(&self, mut head: Vec<u8>, input: Box<dyn Read + Send>) -> Box<dyn Read + Send> {
         if head.starts_with(BYTE_ORDER_MARK) {
             head.drain(..BYTE_ORDER_MARK.len());
@@ -95,13 +95,13 @@ impl Decoding {
     }
 }
 
-/// An input with its bytes brought to UTF-8 and its line ends to LF.
+/// An input converted to UTF-8 with LF line ends.
 struct Decoded {
     input: Box<dyn Read + Send>,
     decoder: Option<Decoder>,
     line_ends: LineEnds,
     raw: Vec<u8>,
-    /// What was decoded, and how much of it was handed out.
+    /// Decoded text, and how much of it was output.
     text: Vec<u8>,
     at: usize,
     at_end: bool,
@@ -130,7 +130,7 @@ impl Decoded {
                 let most = decoder.max_utf8_buffer_length(count).unwrap_or(4 * count);
                 let mut text = String::with_capacity(most);
                 let (_, _, has_faults) = decoder.decode_to_string(raw, &mut text, self.at_end);
-                // Half a character at the end of a file that was cut there.
+                // An incomplete character at the end of a truncated file.
                 if self.at_end && has_faults && is_wide(decoder.encoding()) {
                     text.truncate(text.trim_end_matches('\u{FFFD}').len());
                 }
@@ -166,7 +166,7 @@ fn is_wide(encoding: &'static Encoding) -> bool {
     encoding == UTF_16LE || encoding == UTF_16BE
 }
 
-/// UTF-16, by its mark or by every second byte of the head being zero.
+/// UTF-16, by its byte order mark or by every second byte of the head being zero.
 fn utf16(head: &[u8]) -> Option<&'static Encoding> {
     if head.starts_with(b"\xFF\xFE") {
         return Some(UTF_16LE);
@@ -185,10 +185,10 @@ fn utf16(head: &[u8]) -> Option<&'static Encoding> {
     }
 }
 
-/// Refuses what is no text, by its first bytes.
+/// Rejects a non-text file by its first bytes.
 ///
 /// # Errors
-/// If it is another format that is often handed over in place of text, or binary.
+/// If it is another format commonly supplied instead of text, or binary.
 pub fn refuse_binary(head: &[u8]) -> Result<(), Failure> {
     match utf16(head) {
         Some(_) => Ok(()),
@@ -196,7 +196,7 @@ pub fn refuse_binary(head: &[u8]) -> Result<(), Failure> {
     }
 }
 
-/// Names the formats that are often handed over in place of text.
+/// Rejects formats commonly supplied instead of text, by name.
 fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
     let known: [(&[u8], &str); 3] = [
         (
@@ -225,8 +225,8 @@ fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
     }
 }
 
-/// Whether there are more zero bytes than a fault in a text would leave, or more of the other characters that no text has.
-/// Of random bytes, a tenth is such.
+/// Whether there are more zero bytes than a fault in a text would leave, or more other non-text characters. They make
+/// up a tenth of random bytes.
 fn is_binary(head: &[u8]) -> bool {
     let is_of_text = |byte: u8| matches!(byte, 0 | b'\t'..=b'\r' | 0x1a | 0x1b | b' '..);
     let most = head.len() / 100;
@@ -266,7 +266,7 @@ mod tests {
             let bytes = [mark, &wide(big)].concat();
             assert_eq!(text(&bytes), "Zeit;\u{b5}m\n1;2\n", "{mark:?} {big}");
         }
-        // Cut within its last character, of which nothing is kept.
+        // Truncated within its last character, of which nothing is kept.
         assert_eq!(
             text(&[b"\xFF\xFE", &wide(false)[..19]].concat()),
             "Zeit;\u{b5}m\n1"

@@ -1,9 +1,9 @@
-//! How cells and numbers are written, and the cells of a line.
+//! Format of cells and numbers, and splitting of a line into cells.
 
 pub use crate::io::Delimiter;
 use crate::io::DialectOverride;
 
-/// How numbers and cells are written.
+/// Format of numbers and cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Dialect {
     /// What separates cells.
@@ -13,7 +13,7 @@ pub struct Dialect {
 }
 
 impl Dialect {
-    /// Cells of a line, spaces around them taken off; quoted cells are unquoted.
+    /// Cells of a line without surrounding spaces; quoted cells are unquoted.
     #[must_use]
     pub fn cells(self, line: &str) -> Vec<String> {
         let line = line.trim_end_matches(['\r', '\n']);
@@ -28,7 +28,7 @@ impl Dialect {
         }
     }
 
-    /// Name for people.
+    /// Name for messages.
     #[must_use]
     pub fn describe(self) -> String {
         let delimiter = match self.delimiter {
@@ -48,7 +48,7 @@ impl Dialect {
     }
 }
 
-/// Cells of a line with quotes, as the `csv` crate reads them.
+/// Cells of a line with quotes, parsed by the `csv` crate.
 fn quoted_cells(line: &str, delimiter: u8) -> Vec<String> {
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(delimiter)
@@ -62,7 +62,7 @@ fn quoted_cells(line: &str, delimiter: u8) -> Vec<String> {
     }
 }
 
-/// Whether a line is empty, a comment, or has nothing but separators.
+/// Whether a line is empty, a comment, or contains only separators.
 #[must_use]
 pub fn is_skipped(line: &str) -> bool {
     let text = line.trim();
@@ -76,8 +76,8 @@ pub fn is_comment(line: &str) -> bool {
     text.starts_with(['#', '%', '!']) || text.starts_with("//")
 }
 
-/// UTF-8, or else the Windows-1252 of older recorders (Latin-1 with quotation marks and dashes), in
-/// which any byte is a character.
+/// UTF-8, otherwise the Windows-1252 of older recorders (Latin-1 with quotation marks and dashes),
+/// in which any byte is a character.
 #[must_use]
 pub fn decode_line(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
@@ -89,7 +89,8 @@ pub fn decode_line(bytes: &[u8]) -> String {
     }
 }
 
-/// Dialects in the order of preference between equals. A decimal comma between commas needs quotes.
+/// Dialects in the order of preference among equals. A decimal comma with comma separators requires
+/// quotes.
 pub fn dialects(told: &DialectOverride, quoted: bool) -> Vec<Dialect> {
     let delimiters = match told.delimiter {
         Some(delimiter) => vec![delimiter],

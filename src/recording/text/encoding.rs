@@ -1,16 +1,16 @@
-//! Encodings of text before Unicode, told from its bytes.
+//! Detection of legacy text encodings.
 //!
-//! Western recorders write Windows-1252, often nothing of it but the signs of units (°, µ, ²): that is what is taken
-//! unless a word says otherwise. Words are judged by `chardetng`, which knows how often letters follow each other in the
-//! languages of each encoding; a sign or two are too little for it.
+//! Western recorders write Windows-1252, often only for unit signs (°, µ, ²): that is assumed unless a word indicates
+//! otherwise. Words are judged by `chardetng`, from letter frequencies in the languages of each encoding; one or two
+//! signs are not enough for it.
 
 use chardetng::{EncodingDetector, Iso2022JpDetection, Utf8Detection};
 use encoding_rs::{Encoding, SHIFT_JIS, WINDOWS_1252};
 
-/// Bytes beyond ASCII that follow each other in a word of an alphabet or script that is not Latin.
+/// Number of consecutive non-ASCII bytes in a word of a non-Latin alphabet or script.
 const WORD: usize = 4;
 
-/// The encoding of a text by its head; none for UTF-8 and Windows-1252.
+/// The encoding of a text from its head; `None` for UTF-8 and Windows-1252.
 pub fn told(head: &[u8]) -> Option<&'static Encoding> {
     if is_utf8(head) {
         return None;
@@ -32,7 +32,7 @@ pub fn told(head: &[u8]) -> Option<&'static Encoding> {
     (guess != WINDOWS_1252 && !has_faults && has_words).then_some(guess)
 }
 
-/// The name of an encoding for people.
+/// Name of an encoding for messages.
 pub fn name(encoding: &'static Encoding) -> &'static str {
     match encoding.name() {
         "Shift_JIS" => "Shift-JIS",
@@ -42,7 +42,7 @@ pub fn name(encoding: &'static Encoding) -> &'static str {
     }
 }
 
-/// Whether it is UTF-8, apart from faults: most bytes beyond ASCII are in lines without any.
+/// Whether it is UTF-8 apart from faults: most non-ASCII bytes are in lines without faults.
 fn is_utf8(head: &[u8]) -> bool {
     let (mut good, mut bad) = (0, 0);
     for line in head.split(|byte| *byte == b'\n') {
@@ -59,12 +59,12 @@ fn is_latin(c: char) -> bool {
     matches!(c, '\0'..='\u{24F}' | '\u{1E00}'..='\u{1EFF}')
 }
 
-/// Whether bytes beyond ASCII make a word somewhere.
+/// Whether non-ASCII bytes form a word somewhere.
 fn has_long_run(text: &[u8]) -> bool {
     text.split(u8::is_ascii).any(|run| run.len() >= WORD)
 }
 
-/// Whether a byte beyond ASCII is a letter between two letters and not the sign of a unit between them, as in `N·m`,
+/// Whether a non-ASCII byte is a letter between two letters rather than a unit sign between them, as in `N·m`,
 /// `m²K`, `Temp°C` and `xµm`.
 fn is_letter_in_word(bytes: &[u8]) -> bool {
     const SIGNS: [u8; 4] = [0xB0, 0xB2, 0xB5, 0xB7];
@@ -75,8 +75,8 @@ fn is_letter_in_word(bytes: &[u8]) -> bool {
     is_letter && before.is_ascii_alphabetic() && after.is_ascii_alphabetic()
 }
 
-/// Whether it is Japanese text in Shift-JIS: it decodes without a fault, most characters beyond ASCII are of two bytes
-/// that begin with one that Latin-1 leaves unused, and two of them make a word somewhere.
+/// Whether it is Japanese text in Shift-JIS: it decodes without errors, most non-ASCII characters have two bytes
+/// starting with one unused in Latin-1, and two of them form a word somewhere.
 fn is_shift_jis(whole: &[u8]) -> bool {
     let (_, has_faults) = SHIFT_JIS.decode_without_bom_handling(whole);
     let (mut doubles, mut others, mut words) = (0_usize, 0_usize, 0_usize);
@@ -98,7 +98,7 @@ mod tests {
     use crate::recording::text::decode::Decoding;
     use std::io::Read;
 
-    /// The text of bytes, and what is unusual about them.
+    /// The decoded text of bytes, and its unusual properties.
     fn decoded(bytes: &[u8]) -> (Vec<u8>, Vec<&'static str>) {
         let decoding = Decoding::of(bytes).unwrap();
         let mut text = Vec::new();
@@ -128,7 +128,7 @@ mod tests {
     fn a_stray_byte_takes_no_utf8_away() {
         let bytes = ["时间,扭矩\n# 20 ".as_bytes(), b"\xB0C\n0,1\n"].concat();
         assert_eq!(told(&bytes), None);
-        // 转 is D7 AA in GBK, which is a letter of UTF-8 as well.
+        // 转 is D7 AA in GBK, which is also a letter in UTF-8.
         let (bytes, _, _) = encoding_rs::GBK.encode("转\n时间,扭矩\n0,1\n");
         assert_eq!(told(&bytes), Some(encoding_rs::GBK));
     }

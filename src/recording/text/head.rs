@@ -1,4 +1,4 @@
-//! The first lines of a text, and where its table of numbers is in them.
+//! The first lines of a text, and detection of the table of numbers in them.
 
 use std::collections::BTreeMap;
 
@@ -14,23 +14,23 @@ use crate::failure::{ErrorCode, Failure};
 use crate::io::DialectOverride;
 use crate::recording::text::dialect::{Delimiter, Dialect, dialects, is_skipped};
 
-/// Bytes that a table is looked for in, and more if there is none.
+/// Bytes in which a table is searched for, increased if there is none.
 const HEADS: [usize; 4] = [FIRST_ROWS, 1 << 18, 1 << 20, 1 << 23];
-/// Part of the lines from the first row on that must be rows.
+/// Minimum fraction of rows among the lines from the first row on.
 const MOSTLY: f64 = 0.8;
 
-/// Lines at the end of a head by which the most promising dialect is told.
+/// Number of lines at the end of a head for finding the most promising dialect.
 const PROMISING: usize = 32;
 
-/// Lines that a maker is told from.
+/// Number of lines for recognising a maker.
 const FOR_NAMES: usize = 120;
 
-/// A line: where it begins, and its text.
+/// A line: its offset and text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    /// Its first byte.
+    /// Offset of its first byte.
     pub offset: usize,
-    /// Its text, without its end.
+    /// Its text, without line end.
     pub text: String,
 }
 
@@ -41,24 +41,24 @@ pub struct Head {
     pub lines: Vec<Line>,
     /// Number of the first of them in the file, from 1.
     pub first_number: usize,
-    /// Whether that is all there is.
+    /// Whether the text is complete.
     pub complete: bool,
 }
 
-/// Where a table is and how it is written.
+/// Location and dialect of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     /// How it is written.
     pub dialect: Dialect,
-    /// Place of its first row among the lines of the head.
+    /// Index of its first row among the lines of the head.
     pub first: usize,
-    /// Columns of its widest row.
+    /// Number of columns of its widest row.
     pub width: usize,
-    /// Whether rows hold texts beside their numbers.
+    /// Whether rows contain texts as well as numbers.
     pub has_texts: bool,
 }
 
-/// Whether a text begins so, in any case.
+/// Whether a text begins with another, ignoring case.
 #[must_use]
 pub fn starts(text: &str, with: &str) -> bool {
     text.get(..with.len())
@@ -66,13 +66,13 @@ pub fn starts(text: &str, with: &str) -> bool {
 }
 
 impl Head {
-    /// The lines of a text, the first of which has a number; `complete` says that no more follow.
+    /// Lines of a text, the first of which has this number; `complete` means that no more follow.
     #[must_use]
     pub fn of(text: &[u8], complete: bool, number: usize) -> Self {
         let mut lines = Vec::new();
         let mut offset = 0;
         for piece in text.split_inclusive(|byte| *byte == b'\n') {
-            // A line that goes on after the head says nothing for sure.
+            // A line that continues after the head is inconclusive.
             if complete || piece.ends_with(b"\n") {
                 let (text, _) = cleaned(piece);
                 lines.push(Line { offset, text });
@@ -89,7 +89,7 @@ impl Head {
         }
     }
 
-    /// Whether a line begins so, in any case.
+    /// Whether a line begins with a text, ignoring case.
     #[must_use]
     pub fn starts(&self, line: usize, with: &str) -> bool {
         self.lines
@@ -97,7 +97,7 @@ impl Head {
             .is_some_and(|line| starts(&line.text, with))
     }
 
-    /// Whether one of the first lines is so.
+    /// Whether one of the first lines satisfies a predicate.
     #[must_use]
     pub fn any(&self, is: impl Fn(&str) -> bool) -> bool {
         self.lines.iter().take(FOR_NAMES).any(|line| is(&line.text))
@@ -113,7 +113,7 @@ impl Head {
 /// Finds the next table in a text; `number` is that of its first line.
 ///
 /// # Errors
-/// If there is none, or more than one way to read it.
+/// If there is none, or it is ambiguous.
 pub fn find(
     chunks: &mut Chunks,
     number: usize,
@@ -169,7 +169,8 @@ fn find_in(head: &Head, marks: &DialectOverride) -> Result<Table, Failure> {
     Ok(best.table.clone())
 }
 
-/// The table without a first row that numbers the columns, `1,2,3`, from which time would fall back.
+/// The table without a first row that numbers the columns, `1,2,3`, after which time would step
+/// back.
 fn below_numbering(head: &Head, mut table: Table) -> Table {
     let mut rows = (table.first..head.lines.len())
         .filter(|line| !is_skipped(&head.lines[*line].text))
@@ -194,18 +195,18 @@ pub fn is_numbering(cells: &[String]) -> bool {
     cells.len() > 1 && numbered.all(|(cell, number)| *cell == number.to_string())
 }
 
-/// Whether a line says that the data end; what follows are lists of another kind.
+/// Whether a line marks the end of the data, followed by lists of another kind.
 #[must_use]
 pub fn is_end(line: &str) -> bool {
     line.trim_end() == "EOF"
 }
 
-/// What a line is as a row.
+/// Properties of a line as a row.
 #[derive(Debug, Clone, Copy)]
 struct Shape {
-    /// Cells, empty ones at the end left out.
+    /// Number of cells, without empty ones at the end.
     width: usize,
-    /// Numbers with marks between thousands.
+    /// Number of cells with thousands separators.
     grouped: usize,
     /// Whether its first cell is a text.
     is_named: bool,
@@ -216,7 +217,7 @@ fn strict_row(line: &str, dialect: Dialect) -> Option<Shape> {
     shape(line, dialect, |numbers, texts, _| numbers > 0 && texts == 0)
 }
 
-/// A row that may hold as many texts as numbers and times.
+/// A row with at most as many texts as numbers and times.
 fn lenient_row(line: &str, dialect: Dialect) -> Option<Shape> {
     shape(line, dialect, |numbers, texts, data| {
         numbers > 0 && data + texts > 1 && data >= texts
@@ -224,7 +225,7 @@ fn lenient_row(line: &str, dialect: Dialect) -> Option<Shape> {
 }
 
 fn shape(line: &str, dialect: Dialect, good: fn(usize, usize, usize) -> bool) -> Option<Shape> {
-    // Quick refusal of prose: no digit, no row.
+    // Quick rejection of prose: without digits there is no row.
     if !line.bytes().any(|byte| byte.is_ascii_digit()) {
         return None;
     }
@@ -248,17 +249,17 @@ fn shape(line: &str, dialect: Dialect, good: fn(usize, usize, usize) -> bool) ->
     })
 }
 
-/// A table under one dialect, and how much it explains.
+/// A table in one dialect, and how much it explains.
 struct Found {
     table: Table,
     rows: usize,
     grouped: usize,
 }
 
-/// Reads a line as a row.
+/// Parses a line as a row.
 type ReadRow = fn(&str, Dialect) -> Option<Shape>;
 
-/// The tables under the dialects that explain most rows, in the order of the dialects; others may be left out.
+/// The tables in the dialects that explain most rows, in the order of the dialects; others may be omitted.
 fn tables(head: &Head, dialects: &[Dialect], row: ReadRow) -> Vec<Found> {
     let lines = head.lines.iter().enumerate();
     let lines: Vec<(usize, &Line)> = lines.filter(|(_, line)| !is_skipped(&line.text)).collect();
@@ -282,7 +283,7 @@ fn tables(head: &Head, dialects: &[Dialect], row: ReadRow) -> Vec<Found> {
 }
 
 impl Found {
-    /// `None` as well if it explains less than `least` rows.
+    /// Also `None` if it explains less than `least` rows.
     fn of(lines: &[(usize, &Line)], dialect: Dialect, row: ReadRow, least: usize) -> Option<Self> {
         let mut shapes: Vec<(usize, Option<Shape>)> = Vec::with_capacity(lines.len());
         let mut possible = lines.len();
@@ -296,7 +297,7 @@ impl Found {
         }
         let from = first_row(&shapes)?;
         let rows: Vec<Shape> = shapes[from..].iter().filter_map(|(_, s)| *s).collect();
-        // One row is a table only where there is nothing else.
+        // A single row is a table only if there is nothing else.
         if rows.len() < 2 && shapes.len() > 2 {
             return None;
         }
@@ -313,8 +314,8 @@ impl Found {
     }
 }
 
-/// Place of the first row: the first from which on most lines are rows. A line of another width
-/// than the rows after it is none of them.
+/// Index of the first row: the first from which on most lines are rows. A line with a different
+/// width than the rows after it is excluded.
 fn first_row(shapes: &[(usize, Option<Shape>)]) -> Option<usize> {
     let mut rows_after = vec![0_usize; shapes.len() + 1];
     for place in (0..shapes.len()).rev() {
@@ -330,10 +331,10 @@ fn first_row(shapes: &[(usize, Option<Shape>)]) -> Option<usize> {
         };
         let mostly = rows_after[*place] as f64 >= MOSTLY * (shapes.len() - place) as f64;
         let next = shapes.get(place + 1).and_then(|(_, shape)| *shape);
-        // A line of numbers below a key of its own, with text after it, is no row.
+        // A line of numbers below a key of its own, followed by text, is not a row.
         let is_alone = place + 1 < shapes.len() && next.is_none();
         let fits = shape.width == usual || next.is_none_or(|next| next.width == shape.width);
-        // A key with values above rows of numbers is none of them.
+        // A key with values above rows of numbers is not one of them.
         mostly && fits && !is_alone && shape.is_named == are_named
     };
     (0..shapes.len()).find(is_first)
@@ -352,8 +353,8 @@ fn usual_width(shapes: &[(usize, Option<Shape>)]) -> Option<usize> {
     most.map(|(width, _)| *width)
 }
 
-/// The dialect with the most rows; between equals the one that needs fewer thousands marks, then the
-/// first.
+/// The dialect with the most rows; among equals the one with the fewest thousands separators, then
+/// the first.
 fn best(found: &[Found]) -> Option<&Found> {
     found.iter().reduce(|best, other| {
         let better =
@@ -362,8 +363,8 @@ fn best(found: &[Found]) -> Option<&Found> {
     })
 }
 
-/// The best way to read, unless a comma can be read in two ways that explain all rows: then headings
-/// settle it, or the user is asked.
+/// The best dialect, unless a comma has two readings that explain all rows: then headings decide, or
+/// the user is asked.
 fn unambiguous<'a>(head: &Head, found: &'a [Found], best: &'a Found) -> Result<&'a Found, Failure> {
     let equal = |other: &&Found| other.rows == best.rows && other.table != best.table;
     let comma = Delimiter::Byte(b',');
@@ -378,7 +379,7 @@ fn unambiguous<'a>(head: &Head, found: &'a [Found], best: &'a Found) -> Result<&
         return Ok(best);
     }
     let shown: String = text.chars().take(60).collect();
-    // 0,5 between cells or as a decimal mark; headings with as many cells settle it, or a comma that
+    // 0,5 as two cells or with a decimal comma; headings with as many cells decide, or a comma that
     // nothing follows in any row.
     let separator = found
         .iter()

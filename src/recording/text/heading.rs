@@ -26,7 +26,7 @@ pub fn split(heading: &str) -> (&str, Option<NamedUnit>) {
     (heading, None)
 }
 
-/// Name of a heading and the unit behind an underscore; the longest unit, since `accel_m_s` does not end in seconds.
+/// Name and unit of a heading with an underscore; the longest unit, since `accel_m_s` does not end in seconds.
 fn ending(heading: &str) -> Option<(&str, &'static str)> {
     let before = |text: &str, unit: &str| Some(text.strip_suffix(unit)?.strip_suffix('_')?.len());
     // torque_N mm, torque_ft-lbf
@@ -43,8 +43,8 @@ fn ending(heading: &str) -> Option<(&str, &'static str)> {
     Some((name, meaning))
 }
 
-/// A unit after an underscore that can be something else, where the name says that it is meant: `position_m` and
-/// `motor_current_A`, but not `arm_m` and `phase_A`.
+/// A unit after an underscore that is ambiguous, if the name confirms it: `position_m` and `motor_current_A`,
+/// but not `arm_m` and `phase_A`.
 fn suffixed(text: &str) -> Option<(&str, &'static str)> {
     let (name, letters) = text.rsplit_once('_')?;
     let lower = name.to_lowercase();

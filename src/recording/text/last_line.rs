@@ -1,23 +1,24 @@
-//! A last line without a line end where the other lines have one: the file may have been cut within it.
+//! A last line without a line end where the other lines have one: the file may be truncated within it.
 
 use super::cell::Cell;
 use super::rows::{ColumnKind, RowPlan, cleaned};
 use crate::recording::text::dialect::is_skipped;
 use crate::warning::Warning;
 
-/// What a last line without a line end is.
+/// Kind of a last line without a line end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LastLine {
-    /// No row: a remark, an empty line, the only line there is.
+    /// Not a row: a remark, an empty line, the only line there is.
     Harmless,
-    /// A whole row whose last number may be cut.
+    /// A complete row whose last number may be truncated.
     Suspect,
-    /// A row that lacks cells, or has one that cannot be read: it does not count.
+    /// A row with missing or unreadable cells; it is not used.
     Cut,
 }
 
 impl LastLine {
-    /// Judges the last line of a text, which has no line end; `is_first` if no line stands before the text.
+    /// Judges the last line of a text, which has no line end; `is_first` means that no line precedes the
+    /// text.
     pub fn of(text: &[u8], is_first: bool, plan: &RowPlan) -> Self {
         let mut lines = text
             .rsplit(|byte| *byte == b'\n')
@@ -54,7 +55,7 @@ impl LastLine {
         if is_cut { Self::Cut } else { Self::Suspect }
     }
 
-    /// What is said of it; `place` is the file and the line, `line` its text.
+    /// Warning about it; `place` is the file and the line, `line` its text.
     pub fn warning(self, place: &str, line: &str) -> Option<Warning> {
         match self {
             Self::Harmless => None,
@@ -71,12 +72,12 @@ impl LastLine {
     }
 }
 
-/// What stands behind the last line feed.
+/// Text after the last line feed.
 pub fn last_line(text: &[u8]) -> &[u8] {
     &text[memchr::memrchr(b'\n', text).map_or(0, |place| place + 1)..]
 }
 
-/// What was lost if a file ends within a line, `line 7`.
+/// Loss if a file ends within a line, `line 7`.
 pub fn truncated(line: &str, text: &str) -> Warning {
     Warning::new(
         "truncated-last-line",

@@ -1,4 +1,4 @@
-//! Lists of settings and of results, which look like tables and are no recordings.
+//! Lists of settings and of results, which look like tables but are not recordings.
 
 use super::cell::Cell;
 use super::clock::EPOCH_S;
@@ -8,16 +8,16 @@ use crate::failure::{ErrorCode, Failure};
 use crate::recording::choice::transposed;
 use crate::recording::text::dialect::is_skipped;
 
-/// Most columns of text, as a part of all, in a table that is a recording.
+/// Maximum fraction of text columns in a table that is a recording.
 const TEXTS: f64 = 0.34;
-/// Rows that a list is told by.
+/// Number of rows used to detect a list.
 const LISTED: usize = 200;
-/// Most states of a switch.
+/// Maximum number of states of a switch.
 const STATES: usize = 3;
-/// Most rows of a list of results.
+/// Maximum number of rows of a list of results.
 const FEW_RESULTS: usize = 50;
 
-/// Refuses a list of settings or results: most of its columns hold texts.
+/// Rejects a list of settings or results, in which most columns contain texts.
 ///
 /// # Errors
 /// If it is one.
@@ -46,12 +46,12 @@ pub fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
             ),
         ));
     }
-    // Beside the time of each row, states such as those of alarms say nothing against a recording.
+    // With a time for each row, states such as alarms are consistent with a recording.
     let has_time = (0..table.width).any(|place| is_clock(&read, place)) || begins_with_epoch(&read);
     let texts = (0..table.width)
         .filter(|place| is_text(&read, *place) && !(has_time && is_state(&rows, *place)))
         .count();
-    // One or two columns of remarks may stand beside a single signal.
+    // A single signal may have one or two columns of remarks.
     if texts > 2 && texts as f64 > TEXTS * table.width as f64 {
         return Err(Failure::failed(
             ErrorCode::NotARecording,
@@ -66,7 +66,7 @@ pub fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses a table whose rows name one variable after the other beside the same stamps: their values would
+/// Rejects a table whose rows name one variable after the other with the same stamps: their values would
 /// be read as one channel.
 ///
 /// # Errors
@@ -99,7 +99,7 @@ pub fn refuse_variables(head: &Head, table: &Table, kinds: &[ColumnKind]) -> Res
     }
 }
 
-/// Whether the first column holds whole seconds since 1970, as a stamp without a heading does.
+/// Whether the first column contains whole seconds since 1970, like a stamp without a heading.
 fn begins_with_epoch(rows: &[Vec<Cell>]) -> bool {
     let is_epoch = |row: &Vec<Cell>| match row.first() {
         Some(Cell::Number(s)) => s.fract() == 0.0 && EPOCH_S.contains(s),
@@ -108,7 +108,8 @@ fn begins_with_epoch(rows: &[Vec<Cell>]) -> bool {
     rows.len() > 1 && rows.iter().all(is_epoch)
 }
 
-/// After how many rows the texts of a column come again in the same order, all of them different.
+/// Number of rows after which the texts of a column repeat in the same order, all of them
+/// different.
 fn cycle(rows: &[Vec<String>], place: usize) -> Option<usize> {
     let texts: Vec<&String> = rows.iter().filter_map(|row| row.get(place)).collect();
     let count = 1 + texts.iter().skip(1).position(|text| *text == texts[0])?;
@@ -128,7 +129,7 @@ fn first_cells(head: &Head, table: &Table) -> Vec<Vec<String>> {
         .collect()
 }
 
-/// Whether a column holds more texts than data.
+/// Whether a column contains more texts than data.
 fn is_text(rows: &[Vec<Cell>], place: usize) -> bool {
     let (mut texts, mut data) = (0, 0);
     for cell in rows.iter().filter_map(|row| row.get(place)) {
@@ -138,7 +139,7 @@ fn is_text(rows: &[Vec<Cell>], place: usize) -> bool {
     texts > data
 }
 
-/// Whether a column holds nothing but dates and times.
+/// Whether a column contains only dates and times.
 fn is_clock(rows: &[Vec<Cell>], place: usize) -> bool {
     rows.len() > 1
         && rows
@@ -146,7 +147,7 @@ fn is_clock(rows: &[Vec<Cell>], place: usize) -> bool {
             .all(|row| matches!(row.get(place), Some(Cell::Clock(_))))
 }
 
-/// Whether a column holds few different texts, as switches and alarms do.
+/// Whether a column contains few different texts, as for switches and alarms.
 fn is_state(rows: &[Vec<String>], place: usize) -> bool {
     let mut states: Vec<&String> = rows.iter().filter_map(|row| row.get(place)).collect();
     states.sort_unstable();
@@ -154,7 +155,7 @@ fn is_state(rows: &[Vec<String>], place: usize) -> bool {
     states.len() <= STATES
 }
 
-/// Whether a few rows have names in the first column, no two the same and none of them a time.
+/// Whether a few rows have distinct names in the first column, none of them a time.
 fn is_list_of_results(rows: &[Vec<Cell>], names: &[String]) -> bool {
     let is_name = |name: &&String| name.bytes().all(|byte| !byte.is_ascii_digit());
     let distinct = || {

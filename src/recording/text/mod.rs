@@ -1,9 +1,9 @@
-//! Recordings in text: one way from bytes to channels, whatever the dialect.
+//! Text recordings: from bytes to channels, whatever the dialect.
 //!
-//! `decode` brings the bytes to lines and `chunks` cuts them into pieces; `makers` knows who writes how;
-//! `head` finds the table and `header` reads what stands above it, with the help of `keys` and `units`;
-//! `axes` finds the time; `rows` reads the numbers. The first rows decide all of that: then the table is
-//! read as a whole, or one channel of it piece by piece (`stream`).
+//! `decode` converts the bytes to lines and `chunks` splits them into pieces; `makers` recognises
+//! makers' formats; `head` finds the table and `header` parses the lines above it, with the help of
+//! `keys` and `units`; `axes` finds the time; `rows` parses the numbers. The first rows determine all of
+//! that: then the table is read as a whole, or one channel of it piece by piece (`stream`).
 
 mod axes;
 mod axis_names;
@@ -61,40 +61,40 @@ pub use stream::{BRIDGE, ChannelPlan, ChannelRows, Problem, StampColumn, StampUs
 pub use table::Layout;
 use table::{FIRST_ROWS, Hints, ReadTable};
 
-/// Bytes that the encoding is told from.
+/// Number of bytes for detecting the encoding.
 const FOR_ENCODING: u64 = 1 << 16;
-/// Bytes that a maker is told from.
+/// Number of bytes for recognising a maker.
 const FOR_MAKER: usize = 1 << 14;
-/// Fewest numbers in a text of one line that are the samples of one channel.
+/// Minimum number of values in a single line that are the samples of one channel.
 const ONE_LINE: usize = 32;
-/// Most tables below each other.
+/// Maximum number of tables in sequence.
 const MOST_TABLES: usize = 1000;
-/// Most details that are kept.
+/// Maximum number of details kept.
 const DETAILS: usize = 100;
 
-/// A text that is open, its first table found.
+/// An open text with its first table found.
 pub struct TextFile {
-    /// What its first rows and the lines above them say: channels without samples. Without channels if
-    /// a maker's reader needs the whole text.
+    /// Information from its first rows and the lines above them: channels without samples. Without
+    /// channels if a maker's reader needs the whole text.
     pub recording: Recording,
-    /// Why it has to be read as a whole, if it has to.
+    /// Why it has to be read as a whole, if so.
     pub held_whole: Option<&'static str>,
     chunks: Chunks,
-    /// What is said of its maker and its encoding.
+    /// Description of its maker and encoding.
     words: Vec<&'static str>,
-    /// Whether its bytes are not those of the file.
+    /// Whether its bytes differ from those of the file.
     is_decoded: bool,
     maker: Option<Maker>,
-    /// Unless a maker's reader looks for it.
+    /// `None` if a maker's reader finds it.
     layout: Option<Layout>,
     reading: Reading,
 }
 
 impl TextFile {
-    /// Opens a text and looks at its first rows; `source` is its name for people.
+    /// Opens a text and analyses its first rows; `source` is its name for messages.
     ///
     /// # Errors
-    /// If it is no recording, or leaves open how it is to be read.
+    /// If it is not a recording, or is ambiguous.
     pub fn open(
         source: &str,
         mut input: Box<dyn Read + Send>,
@@ -154,7 +154,7 @@ impl TextFile {
         }
     }
 
-    /// How it is written, for people.
+    /// Description of its format, for messages.
     fn describe(&self, table: &str) -> String {
         let words = self.words.iter().copied().chain([table]);
         words.collect::<Vec<&str>>().join(", ")
@@ -163,12 +163,12 @@ impl TextFile {
     /// Reads all of it.
     ///
     /// # Errors
-    /// If it cannot be read, or leaves open how.
+    /// If it cannot be read, or is ambiguous.
     pub fn read(self) -> Result<Recording, Failure> {
         self.read_first(usize::MAX).map(|(recording, _)| recording)
     }
 
-    /// Numbers that a text of so many bytes holds, as its first rows show; 0 if that is unknown.
+    /// Estimated number of values in a text of this many bytes, from its first rows; 0 if unknown.
     pub fn numbers_in(&self, bytes: u64) -> u64 {
         self.layout.as_ref().map_or(0, |layout| {
             let rows = layout.first_rows.count as u64;
@@ -178,11 +178,10 @@ impl TextFile {
         })
     }
 
-    /// Reads it, and keeps no more than about so many numbers of a long table; of its channels, what all of their samples
-    /// come to.
+    /// Reads it, keeping about `most` numbers of a long table; also returns statistics of all samples of its channels.
     ///
     /// # Errors
-    /// If it cannot be read, or leaves open how.
+    /// If it cannot be read, or is ambiguous.
     pub fn read_first(
         mut self,
         most: usize,
@@ -213,7 +212,7 @@ impl TextFile {
         Ok((read, tails))
     }
 
-    /// Reads one of its channels, by its place, piece by piece, unless it is held whole.
+    /// Streams one of its channels, by index, unless it is held as a whole.
     pub fn stream(self, channel: usize, stamp_use: StampUse) -> TextStream {
         let layout = self.layout.expect("a text that streams has one table");
         let place = layout.channel_places().nth(channel).unwrap_or(0);
@@ -230,15 +229,15 @@ fn no_channel(warnings: &[Warning]) -> Failure {
     )
 }
 
-/// Reads a text file of any dialect; `source` is its name for people.
+/// Reads a text file of any dialect; `source` is its name for messages.
 ///
 /// # Errors
-/// If it is no recording, or leaves open how it is to be read.
+/// If it is not a recording, or is ambiguous.
 pub fn read(source: &str, bytes: Vec<u8>, reading: &Reading) -> Result<Recording, Failure> {
     TextFile::open(source, Box::new(Cursor::new(bytes)), reading)?.read()
 }
 
-/// A table, or several below each other under the same headings, as a recording.
+/// A table, or several in sequence under the same headings, as a recording.
 fn general(
     chunks: &mut Chunks,
     first: Layout,
@@ -249,7 +248,7 @@ fn general(
     Ok(recording_of(parts).0)
 }
 
-/// A table, or several below each other under the same headings, of all together no more than about so many numbers.
+/// A table, or several in sequence under the same headings, limited to about `most` numbers in total.
 fn tables(
     chunks: &mut Chunks,
     first: Layout,
@@ -296,8 +295,8 @@ fn tables(
     Ok(parts)
 }
 
-/// Puts the numbers of a text that is one line of them into lines of their own: some oscilloscopes write
-/// the samples so.
+/// Splits a text that is a single line of numbers into one line per number: some oscilloscopes write
+/// samples like that.
 fn one_line(chunks: &mut Chunks, reading: &Reading) -> Result<bool, Failure> {
     let mut complete = false;
     for most in [FIRST_ROWS, LONGEST_LINE] {
@@ -338,7 +337,7 @@ fn in_lines(text: &[u8], decimal: u8) -> Option<Vec<u8>> {
     })
 }
 
-/// Puts tables together as the segments of a recording.
+/// Combines tables as the segments of a recording.
 fn recording_of(parts: Vec<ReadTable>) -> (Recording, Vec<Option<AllSamples>>) {
     let mut tails = Vec::new();
     let blocks: usize = parts.iter().map(|part| part.blocks.len()).sum();
@@ -363,7 +362,7 @@ fn recording_of(parts: Vec<ReadTable>) -> (Recording, Vec<Option<AllSamples>>) {
                 recording.channels.push(channel);
             }
         }
-        // What was not kept belongs to the last block.
+        // Samples not kept belong to the last block.
         tails.resize(recording.channels.len() - part.tails.len(), None);
         tails.extend(part.tails);
         recording.warnings.extend(part.warnings);
@@ -372,7 +371,7 @@ fn recording_of(parts: Vec<ReadTable>) -> (Recording, Vec<Option<AllSamples>>) {
     (recording, tails)
 }
 
-/// Keys and values for people.
+/// Keys and values for the report.
 fn details(entries: &[Entry]) -> Vec<(String, String)> {
     entries
         .iter()

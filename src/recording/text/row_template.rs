@@ -1,52 +1,52 @@
-//! Rows that are written like the one before.
+//! Fast parsing of rows with the same format as the preceding one.
 //!
-//! Recorders write every number with the same digits. Once the places of a row's signs, digits and
-//! marks are known, the next row need not be searched for them: they are checked where they are
-//! expected, all digits of a run at once. A row that differs is read the usual way and is the next
-//! template. Both ways give the same bits.
+//! Recorders write every number with the same digits. Once the positions of a row's signs, digits
+//! and marks are known, the next row need not be searched for them: they are checked where they are
+//! expected, all digits of a run at once. A row that differs is parsed normally and becomes the
+//! next template. Both give bitwise equal results.
 
 use super::rows::{ColumnKind, RowPlan, span};
 use crate::io::number::{self, Parts};
 use crate::recording::text::dialect::Delimiter;
 
-/// Rows in a row that make a template worth following at once when it changes.
+/// Number of consecutive rows after which a changed template is replaced immediately.
 const STEADY: usize = 8;
-/// Most rows that are read the usual way before the next attempt.
+/// Maximum number of rows parsed normally before the next attempt.
 const LONGEST_PAUSE: usize = 64;
-/// Digits that are read at once.
+/// Maximum number of digits parsed at once.
 const LONGEST_RUN: usize = 8;
-/// Digits up to which every number is an `f64` times a power of ten.
+/// Number of digits up to which every number is exact as an `f64` times a power of ten.
 const MOST_DIGITS: usize = 15;
 
-/// How the two numbers of a row are written, as far as it is the same from row to row.
+/// Format of the two numbers of a row, as far as it is constant.
 #[derive(Debug)]
 pub(super) struct RowTemplate {
-    /// What parts the cells, where rows can have a template: two numbers beside each other at their start.
+    /// Cell separator, if rows can have a template: two adjacent numbers at their start.
     separator: Option<u8>,
     /// Which of the two is a stamp whose last bit does not matter.
     stamp: Option<usize>,
     shapes: Option<[Shape; 2]>,
-    /// Rows that followed it.
+    /// Number of rows that matched it.
     followed: usize,
-    /// Rows until the next attempt.
+    /// Number of rows until the next attempt.
     pause: usize,
     last_pause: usize,
 }
 
-/// A row as read.
+/// A parsed row.
 pub(super) struct TemplateRow {
     pub(super) values: [f64; 2],
     pub(super) stamp_text: u64,
-    /// Where the next line begins.
+    /// Start of the next line.
     pub(super) end: usize,
 }
 
-/// Places within a number, its sign left out, and what does not change with them.
+/// Format of a number without its sign.
 #[derive(Debug, Clone, Copy)]
 struct Shape {
-    /// Digits before the decimal mark, 1 to 8.
+    /// Number of digits before the decimal mark, 1 to 8.
     whole: usize,
-    /// Digits after it; with 0 there is no mark.
+    /// Number of digits after it; without a mark if 0.
     fraction: usize,
     /// The digits of the fraction, at most eight each.
     runs: [Run; 2],
@@ -54,11 +54,11 @@ struct Shape {
     exponent: bool,
 }
 
-/// Digits that are read at once.
+/// Digits parsed at once.
 #[derive(Debug, Clone, Copy)]
 struct Run {
     digits: usize,
-    /// Ten to the power of their number.
+    /// Ten to the power of the number of digits.
     scale: u64,
 }
 
@@ -78,7 +78,7 @@ impl RowTemplate {
         }
     }
 
-    /// The row at `at`, if it is written like the one before.
+    /// The row at `at`, if it has the format of the preceding one.
     #[inline(always)]
     pub(super) fn row(&mut self, text: &[u8], at: usize, plan: &RowPlan) -> Option<TemplateRow> {
         let shapes = self.shapes.as_ref()?;
@@ -109,7 +109,7 @@ impl RowTemplate {
         })
     }
 
-    /// Takes the row at `at`, which was read the usual way, for the next template.
+    /// Uses the row at `at`, which was parsed normally, as the next template.
     #[inline]
     pub(super) fn learn(&mut self, text: &[u8], at: usize, plan: &RowPlan) {
         let Some(separator) = self.separator else {
@@ -135,7 +135,7 @@ impl RowTemplate {
 }
 
 impl Shape {
-    /// The shapes of the two numbers of a row.
+    /// Formats of the two numbers of a row.
     #[cold]
     fn of_row(text: &[u8], at: usize, separator: u8, decimal: u8) -> Option<[Self; 2]> {
         let (first, end) = Self::of(text, at, decimal)?;
@@ -144,7 +144,7 @@ impl Shape {
         Some([first, second])
     }
 
-    /// The shape of the number at `at`, and its end.
+    /// Format of the number at `at`, and its end.
     fn of(text: &[u8], at: usize, decimal: u8) -> Option<(Self, usize)> {
         let digits = |from: usize| {
             let rest = text.get(from..).unwrap_or(&[]);
@@ -180,8 +180,8 @@ impl Shape {
             .then_some((shape, end))
     }
 
-    /// The number at `at` if it has this shape, and its end. What stands there is not looked at: the
-    /// caller expects a separator.
+    /// The number at `at` if it has this format, and its end. The character there is not checked, as
+    /// the caller expects a separator.
     #[inline(always)]
     fn read(&self, text: &[u8], at: usize, decimal: u8) -> Option<(Parts, usize)> {
         let negative = *text.get(at)? == b'-';
@@ -251,7 +251,7 @@ mod tests {
         }
     }
 
-    /// Rows read together, and each on its own, where there is no template.
+    /// Rows parsed together, and each on its own, without a template.
     fn both(lines: &[String], plan: &RowPlan) -> (Rows, Rows) {
         let (mut together, mut single, mut line) =
             (Rows::default(), Rows::default(), Rows::default());
@@ -298,7 +298,8 @@ mod tests {
         assert!(follows("0.00,1.5\n0.01,2.5\n"));
         assert!(follows("0.00,1.5e-03\r\n0.01,-2.5e+04\r\n"));
         assert!(follows("12,-7\n13,8\n"));
-        // Another number of digits, another form, another separator, more digits than are exact.
+        // A different number of digits, another format, another separator, more digits than are
+        // exact.
         assert!(!follows("0.00,1.5\n0.01,2.55\n"));
         assert!(!follows("0.00,1.5\n0.01,25\n"));
         assert!(!follows("9.99,1.5\n10.00,1.5\n"));
@@ -306,7 +307,7 @@ mod tests {
         assert!(!follows("0.00,1.5\n0.01;1.5\n"));
         assert!(!follows("0,1.000000000000000\n1,1.000000000000000\n"));
         assert!(!follows("0.00,nan\n0.01,nan\n"));
-        // A number goes on before a column that is not wanted.
+        // A number continues before an unwanted column.
         assert!(!follows("0.00,1.5,7\n0.01,2.55,7\n"));
     }
 
@@ -318,7 +319,7 @@ mod tests {
             swapped: bool,
             crlf: bool,
         ) {
-            // The style changes only now and then, as templates need.
+            // The format changes only occasionally, as templates need.
             let (mut digits, mut scientific) = (5, false);
             let lines: Vec<String> = rows.iter().map(|(i, value, new_digits, new_form, change)| {
                 if *change == 0 {

@@ -1,8 +1,8 @@
-//! Rows of numbers out of lines, for every column that is wanted.
+//! Parsing of rows of numbers from lines, for every wanted column.
 //!
-//! Nearly all rows are written like the one before ([`RowTemplate`]) or hold plain numbers between
-//! marks. Whatever else stands in a line (quotes, thousands marks, remarks, faults) is read with care.
-//! All three ways give the same numbers.
+//! Nearly all rows have the format of the preceding one ([`RowTemplate`]) or contain plain numbers
+//! between separators. Anything else in a line (quotes, thousands separators, remarks, faults) is
+//! parsed carefully. All three parsers give the same numbers.
 
 mod cut;
 mod items;
@@ -19,91 +19,93 @@ use crate::recording::{Hole, HoleKind};
 use cut::line_of;
 pub use items::{Item, items};
 
-/// What a column holds.
+/// Content of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColumnKind {
     /// Numbers.
     Numbers,
-    /// Dates and times of day, taken as seconds after this one.
+    /// Dates and times of day, as seconds relative to this one.
     Clock(Clock),
-    /// Numbers with more digits than an `f64` has, taken as differences to this whole one.
+    /// Numbers with more digits than an `f64` has, as differences from this integer.
     Offset(i64),
-    /// Texts, or nothing that is wanted.
+    /// Texts, or nothing wanted.
     Nothing,
 }
 
-/// How rows are written and what is wanted of them.
+/// Format of rows and their wanted content.
 #[derive(Debug, Clone)]
 pub struct RowPlan {
     /// How cells and numbers are written.
     pub dialect: Dialect,
-    /// What the columns hold, up to the last one that is wanted.
+    /// Content of the columns, up to the last wanted one.
     pub kinds: Vec<ColumnKind>,
-    /// Columns of the table; numbers beyond them are noted.
+    /// Number of columns of the table; numbers beyond them are reported.
     pub width: usize,
-    /// Column of the time stamps in use. Without any, a line that is no row may be a lost sample.
+    /// Column of the time stamps in use. Without stamps, a line that is not a row may be a lost
+    /// sample.
     pub stamps: Option<usize>,
-    /// Whether the place of each stamp's text is kept, to be copied. Such stamps are compared with a
-    /// tolerance, so that their last bit does not matter.
+    /// Whether the position of each stamp's text is kept, for copying. Such stamps are compared with
+    /// a tolerance, so that their last bit does not matter.
     pub keeps_stamp_text: bool,
     /// What ends the table.
     pub end: TableEnd,
-    /// Columns whose values follow names that stand in other columns.
+    /// Columns whose values are identified by names in other columns.
     pub items: Vec<Item>,
 }
 
-/// A column as read.
+/// A parsed column.
 #[derive(Debug, Clone, Default)]
 pub struct Column {
     /// A value for each row up to the last that has one.
     pub values: Vec<f64>,
-    /// Cells without a number, up to the same row.
+    /// Non-numeric cells, up to the same row.
     pub holes: Vec<Hole>,
 }
 
-/// Rows as read.
+/// Parsed rows.
 #[derive(Debug, Clone, Default)]
 pub struct Rows {
     /// The columns.
     pub columns: Vec<Column>,
-    /// Where the text of each stamp stands: offset in the upper, length in the lower half.
+    /// Position of the text of each stamp: offset in the upper, length in the lower half.
     pub stamp_text: Vec<u64>,
-    /// How many rows there are.
+    /// Number of rows.
     pub count: usize,
     /// Number of the next line.
     pub line: usize,
-    /// What should be known of the lines.
+    /// Notes about the lines.
     pub notes: LineNotes,
-    /// Empty cells that may still be filled in; they cost memory that the file need not have.
+    /// Number of empty cells that may still be filled; they take memory that the file need not
+    /// have.
     budget: usize,
-    /// Line at which there was no budget left.
+    /// Line at which the budget was exhausted.
     too_ragged: Option<usize>,
-    /// Row and line of each first row after a line that is no row.
+    /// Row and line of each first row after a line that is not a row.
     breaks: Vec<(usize, usize)>,
 }
 
-/// What should be known of the lines of a table.
+/// Notes about the lines of a table.
 #[derive(Debug, Clone, Default)]
 pub struct LineNotes {
-    /// The first line among the rows that is none, and its text.
+    /// The first line among the rows that is not a row, and its text.
     pub odd: Option<(usize, String)>,
-    /// How many of them there are.
+    /// Number of such lines.
     pub odd_count: usize,
     /// The first row with numbers beyond the columns.
     pub too_wide: Option<usize>,
-    /// Zero bytes that were passed over.
+    /// Number of zero bytes skipped.
     pub zeros: usize,
-    /// Rows in which an item of a list stood in another place.
+    /// Number of rows in which an item of a list was at another index.
     pub moved: usize,
 }
 
-/// Empty cells that any file may have, besides one for each byte.
+/// Number of empty cells that any file may have, in addition to one per byte.
 const FREE_CELLS: usize = 1 << 20;
-/// Characters of an odd line that are shown.
+/// Number of characters of an odd line that are shown.
 const SHOWN: usize = 60;
 
 impl Rows {
-    /// No rows yet; the next line has this number.
+    /// Resets to no rows; the next line has this number.
     pub fn begin(&mut self, line: usize, columns: usize) {
         let mut kept = std::mem::take(&mut self.columns);
         for column in &mut kept {
@@ -122,12 +124,13 @@ impl Rows {
         };
     }
 
-    /// Reads the lines of a piece, after those of the pieces before. Every line ends with a line feed
-    /// but perhaps the last. Returns the bytes read: fewer than there are if the table ends before.
+    /// Parses the lines of a piece, after those of preceding pieces. Every line ends with a line
+    /// feed, except possibly the last. Returns the number of bytes consumed: fewer than available if
+    /// the table ends before.
     ///
     /// # Errors
-    /// If the rows have so different lengths that the cells between would need far more memory than
-    /// the file.
+    /// If the row lengths differ so much that the cells between would need far more memory than the
+    /// file.
     pub fn read(&mut self, text: &[u8], plan: &RowPlan) -> Result<usize, Failure> {
         self.budget += text.len();
         let mut template = RowTemplate::of(plan);
@@ -163,7 +166,7 @@ impl Rows {
         }
     }
 
-    /// Reads the rows from `at` on that are written as the template says; returns where they end.
+    /// Parses the rows from `at` on that match the template; returns their end.
     #[inline]
     fn rows_like(
         &mut self,
@@ -206,7 +209,7 @@ impl Rows {
         }
     }
 
-    /// Takes in a line that is no plain row; `false` if the table ends before it.
+    /// Processes a line that is not a plain row; `false` if the table ends before it.
     #[cold]
     fn careful_row(&mut self, line: &[u8], at: usize, plan: &RowPlan) -> bool {
         let (text, zeros) = cleaned(line);
@@ -253,7 +256,7 @@ impl Rows {
         }
         self.notes.moved += usize::from(moved);
         if plan.keeps_stamp_text {
-            // The same text elsewhere in the line does as well, as long as it is not quoted.
+            // The same text elsewhere in the line is equivalent, as long as it is not quoted.
             let cell = plan.stamps.and_then(|place| cells.get(place));
             let cell = cell.map_or(&b""[..], |cell| cell.as_bytes());
             let found = memchr::memmem::find(line, cell);
@@ -264,7 +267,7 @@ impl Rows {
         true
     }
 
-    /// Takes a line without numbers for a row, unless stamps would show that a sample is missing there.
+    /// Treats a line without numbers as a row, unless stamps would show that a sample is missing there.
     fn add_empty_row(&mut self, plan: &RowPlan) {
         if plan.stamps.is_none() {
             self.note_break(self.line);
@@ -299,7 +302,7 @@ impl Rows {
         }
     }
 
-    /// Adds a value to a column; the rows in which it had none become holes.
+    /// Adds a value to a column; the rows without one become holes.
     #[inline]
     fn push(&mut self, place: usize, value: f64) {
         if self.columns[place].values.len() != self.count {
@@ -308,7 +311,7 @@ impl Rows {
         self.columns[place].values.push(value);
     }
 
-    /// Fills a column up to the present row with holes: the cells before it were empty.
+    /// Fills a column up to the present row with holes for empty cells.
     #[cold]
     fn fill(&mut self, place: usize) {
         let column = &mut self.columns[place];
@@ -337,7 +340,7 @@ impl Rows {
             .for_each(|place| self.fill_up_to(*place, longest));
     }
 
-    /// Fills a column that has fewer values than so many rows.
+    /// Fills a column that has fewer values than `rows`.
     pub fn fill_up_to(&mut self, place: usize, rows: usize) {
         if self.columns[place].values.len() < rows {
             let count = std::mem::replace(&mut self.count, rows);
@@ -348,7 +351,7 @@ impl Rows {
 }
 
 impl LineNotes {
-    /// Adds those of the lines after `before` others.
+    /// Merges notes of lines that follow `before` others.
     pub fn join(&mut self, more: &Self, before: usize) {
         if let Some((line, text)) = &more.odd {
             self.odd
@@ -362,7 +365,7 @@ impl LineNotes {
 }
 
 /// Rows of a maker's own table with numbers in some columns, up to a line that begins with one of
-/// `marks`; and where they end.
+/// `marks`; and their end.
 pub fn of_numbers(
     text: &[u8],
     line: usize,
@@ -390,7 +393,7 @@ pub fn of_numbers(
     Ok((rows, end))
 }
 
-/// A line as text, without zero bytes and its end, and how many zero bytes there were.
+/// A line as text, without zero bytes and line end, and the number of zero bytes.
 pub(super) fn cleaned(line: &[u8]) -> (String, usize) {
     let zeros = memchr::memchr_iter(0, line).count();
     let text = match zeros {
@@ -407,7 +410,7 @@ pub(super) fn cleaned(line: &[u8]) -> (String, usize) {
     (text, zeros)
 }
 
-/// Whether cells make a row: a number or a date where one is wanted, and no more texts than those.
+/// Whether cells form a row: a number or a date where one is wanted, and no more texts than those.
 fn is_row(cells: &[Cell], plan: &RowPlan) -> bool {
     let wanted = || cells.iter().zip(&plan.kinds);
     let is_good = |(cell, kind): &(&Cell, &ColumnKind)| match kind {
@@ -423,7 +426,7 @@ fn is_row(cells: &[Cell], plan: &RowPlan) -> bool {
     good > 0 && good >= wanted().filter(is_bad).count()
 }
 
-/// Whether a row has data in other columns than those that are wanted, and nothing in these.
+/// Whether a row has data only in columns that are not wanted.
 fn is_of_other_columns(cells: &[Cell], plan: &RowPlan) -> bool {
     let is_wanted = |place: usize| {
         let kind = plan.kinds.get(place);
@@ -436,8 +439,8 @@ fn is_of_other_columns(cells: &[Cell], plan: &RowPlan) -> bool {
         && cells.all(|(place, cell)| !is_wanted(place) || *cell == Cell::Empty)
 }
 
-/// Whether a line that cannot be read was meant for a row: it begins with a digit, has no letters, and
-/// is no date.
+/// Whether an unreadable line was meant as a row: it begins with a digit, has no letters, and is not a
+/// date.
 fn is_damaged_row(text: &str, cells: &[Cell]) -> bool {
     let text = text.trim_start_matches([' ', '\t', '"', '-', '+', '.']);
     text.starts_with(|c: char| c.is_ascii_digit())
@@ -445,7 +448,7 @@ fn is_damaged_row(text: &str, cells: &[Cell]) -> bool {
         && !cells.iter().any(|cell| matches!(cell, Cell::Clock(_)))
 }
 
-/// Offset and length of a text in one number.
+/// Offset and length of a text packed in one number.
 #[inline]
 pub(super) fn span(offset: usize, length: usize) -> u64 {
     (offset as u64) << 32 | length as u64

@@ -1,16 +1,16 @@
-//! Columns that have a value in some rows only: channels slower than the others of their table.
+//! Columns with values in some rows only: channels slower than the others of their table.
 
 use std::sync::Arc;
 
 use super::rows::Column;
 use crate::recording::{HoleKind, RateFrom, TimeAxis};
 
-/// Fewest values that tell a slow channel.
+/// Minimum number of values of a slow channel.
 const FEWEST: usize = 3;
 
-/// Takes the empty cells out of a column of which more than half are empty, and the stamps beside them
-/// out of its axis: what is left is a channel of its own, slower than the rows. Without stamps the
-/// values must lie evenly, and the rate is divided by the rows between them.
+/// Removes the empty cells of a column of which more than half are empty, and the corresponding stamps
+/// of its axis: the remainder is a separate channel, slower than the rows. Without stamps the values
+/// must be evenly spaced, and the rate is divided by the spacing.
 pub fn thin(column: &mut Column, axis: &mut TimeAxis) {
     if !is_slow(column) {
         return;
@@ -20,7 +20,7 @@ pub fn thin(column: &mut Column, axis: &mut TimeAxis) {
         return;
     }
     let every = spacing(&filled);
-    // A rate that the user gave is that of the rows.
+    // A rate given by the user applies to the rows.
     let stamps = axis
         .stamps_s
         .as_ref()
@@ -38,7 +38,7 @@ pub fn thin(column: &mut Column, axis: &mut TimeAxis) {
     *axis = thinned;
 }
 
-/// Whether a column has a value in half of the rows or fewer, but in some.
+/// Whether a column has a value in some, but at most half of the rows.
 pub fn is_slow(column: &Column) -> bool {
     let rows = column.values.len();
     let filled = rows.saturating_sub(column.holes.len());
@@ -56,7 +56,7 @@ fn filled(column: &Column) -> Vec<usize> {
         .collect()
 }
 
-/// Rows from value to value, if that is always the same.
+/// Distance between values in rows, if constant.
 fn spacing(filled: &[usize]) -> Option<usize> {
     let every = filled[1] - filled[0];
     let even = filled.windows(2).all(|pair| pair[1] - pair[0] == every);
@@ -92,7 +92,7 @@ mod tests {
     use crate::recording::Hole;
     use crate::recording::moment::Moment;
 
-    /// A value in each row that the function takes.
+    /// A value in each row for which the function is true.
     fn column(rows: usize, has: impl Fn(usize) -> bool) -> Column {
         let empty = |row: usize| Hole {
             index: row,
@@ -138,7 +138,7 @@ mod tests {
         thin(&mut gappy, &mut axis);
         assert_eq!((gappy.values.len(), gappy.holes.len()), (before, 2));
         assert_eq!(axis, same);
-        // Uneven, and nothing says when they were taken.
+        // Uneven, and without times.
         let mut uneven = column(30, |row| [0, 3, 10, 13, 20].contains(&row));
         thin(&mut uneven, &mut axis);
         assert_eq!(uneven.values.len(), 30);

@@ -1,4 +1,4 @@
-//! One channel of a table, piece by piece.
+//! Streaming of one channel of a table.
 
 use super::axes::Role;
 use super::cell::{is_instruments_mark, is_non_finite};
@@ -9,33 +9,33 @@ use super::rows::{ColumnKind, LineNotes, RowPlan, Rows};
 use super::table::Layout;
 use crate::io::number;
 
-/// What to do where a number is missing.
+/// Advice for a missing number.
 pub const BRIDGE: &str = "bridge it with --fill linear or --fill hold, or correct the line";
 
-/// A channel that is read piece by piece: the pieces in order, each of which can be read on its own.
+/// A channel read piece by piece; the pieces come in order and can be parsed independently.
 pub struct TextStream {
     /// Pieces of whole lines.
     pub chunks: Chunks,
-    /// How their rows are read.
+    /// Parsing of their rows.
     pub plan: ChannelPlan,
     /// The table.
     pub layout: Layout,
-    /// How its stamps are written, if they are read.
+    /// Format of its stamps, if they are read.
     pub stamps: Option<StampColumn>,
     /// Mean length of a row, in bytes.
     pub row_bytes: usize,
-    /// Byte of the file behind the first rows, if further rows can be read there as they are.
+    /// Byte of the file after the first rows, if further rows can be read there without conversion.
     pub behind_first_rows: Option<u64>,
 }
 
-/// What the stamps beside a channel are read for.
+/// Use of the stamps of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StampUse {
-    /// Not at all.
+    /// Not read.
     Unread,
-    /// The samples are placed by them.
+    /// They place the samples.
     Placing,
-    /// A rate is given in their place; gaps among them are said.
+    /// A rate replaces them; gaps among them are reported.
     Watched,
 }
 
@@ -47,56 +47,56 @@ pub struct StampColumn {
     pub unit: &'static str,
     /// Seconds per unit.
     pub seconds_per_unit: f64,
-    /// Nanoseconds at which they are zero.
+    /// Origin in ns.
     pub origin_ns: i64,
-    /// Whether their text is a number of seconds as the output writes it.
+    /// Whether their text is a number of seconds in the format of the output.
     pub copied: bool,
     /// Those of the first rows, in their unit.
     pub first: Vec<f64>,
 }
 
-/// Which cells of a row are the channel's.
+/// The cells of a row that belong to the channel.
 #[derive(Debug, Clone)]
 pub struct ChannelPlan {
     rows: RowPlan,
     time: Option<usize>,
     value: usize,
-    /// Whether the stamps are not needed: what cannot be read among them is no fault.
+    /// Whether the stamps are not needed, so that unreadable ones are not a fault.
     is_watched: bool,
-    /// Whether stamps are times of day, which begin anew at midnight.
+    /// Whether stamps are times of day, which restart at midnight.
     pub is_time_of_day: bool,
     headings: Vec<String>,
 }
 
-/// Rows of one channel, of a piece of a file.
+/// Rows of one channel in a piece of a file.
 #[derive(Debug, Default)]
 pub struct ChannelRows {
     /// Time stamps as written (in the file's unit); empty without a time column.
     pub times: Vec<f64>,
-    /// Where the text of each time stamp stands: offset in the upper, length in the lower half.
+    /// Position of the text of each time stamp: offset in the upper, length in the lower half.
     pub time_text: Vec<u64>,
     /// The channel's values as written.
     pub values: Vec<f64>,
-    /// Lines seen, rows and others.
+    /// Number of lines seen, rows and others.
     pub lines: usize,
-    /// First of the lines without numbers that no row follows yet; only without stamps, where such a
-    /// line may be a lost sample.
+    /// First of the lines without numbers not yet followed by a row; only without stamps, where such
+    /// a line may be a lost sample.
     pub empty_at: Option<usize>,
-    /// The row that could not be read, if any; nothing after it counts.
+    /// The unreadable row, if any; nothing after it counts.
     pub problem: Option<Problem>,
     /// Whether the table ends within the piece.
     pub ends: bool,
-    /// What should be known of the lines.
+    /// Notes about the lines.
     pub notes: LineNotes,
     rows: Rows,
 }
 
-/// A row that could not be read.
+/// An unreadable row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Problem {
     /// Line within the piece, from 0.
     pub line: usize,
-    /// Place of the cell, from 0.
+    /// Index of the cell, from 0.
     pub cell: usize,
 }
 
@@ -186,12 +186,12 @@ impl ChannelPlan {
         }
     }
 
-    /// Place of the channel's column.
+    /// Index of the channel's column.
     pub fn value_cell(&self) -> usize {
         self.value
     }
 
-    /// What is wrong with a cell of a line, and what to do.
+    /// The fault of a cell, and what to do.
     pub fn describe(&self, line: &str, cell: usize) -> String {
         let column = cell + 1;
         let name = self.headings.get(cell).map_or("", String::as_str);
@@ -225,7 +225,7 @@ impl ChannelPlan {
         format!("column {column} (\"{name}\") is empty; {BRIDGE}")
     }
 
-    /// Line, from 0, that a row of a piece stands on.
+    /// Line, from 0, of a row of a piece.
     pub fn line_of_row(&self, text: &[u8], row: usize) -> usize {
         let mut rows = ChannelRows::default();
         rows.read(text, self);
@@ -246,7 +246,7 @@ impl ChannelRows {
         self.notes = LineNotes::default();
     }
 
-    /// Reads all lines of a piece. Every line ends with a line feed but perhaps the last.
+    /// Parses all lines of a piece. Every line ends with a line feed, except possibly the last.
     pub fn read(&mut self, text: &[u8], plan: &ChannelPlan) {
         self.clear();
         self.exchange(plan);
@@ -260,7 +260,7 @@ impl ChannelRows {
             let hole = self.rows.columns[*place].holes.first()?;
             Some((hole.index, hole.line, *place))
         });
-        // The leftmost cell of the first line that is wrong.
+        // The leftmost bad cell of the first bad line.
         let first = holes.min_by_key(|(index, _, place)| (*index, *place));
         let filled = self.rows.columns[plan.value].values.len();
         if filled < self.rows.count && time.is_none() {
@@ -281,7 +281,7 @@ impl ChannelRows {
         }
     }
 
-    /// Puts the columns into the reader, or takes them out.
+    /// Moves the columns into the parser, or out of it.
     fn exchange(&mut self, plan: &ChannelPlan) {
         let columns = &mut self.rows.columns;
         columns.resize_with(plan.rows.kinds.len(), Default::default);
@@ -293,7 +293,7 @@ impl ChannelRows {
     }
 }
 
-/// A hint if the number would do with the other decimal mark.
+/// A hint if the number would be valid with the other decimal mark.
 fn other_mark(text: &str, decimal: u8) -> &'static str {
     let other = if decimal == b'.' { b',' } else { b'.' };
     match number::cell(text, other) {

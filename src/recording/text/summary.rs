@@ -1,4 +1,5 @@
-//! Rows that are no samples: their number above them, largest, least and mean values and totals below.
+//! Rows that are not samples: their number above them; largest, least and mean values and totals
+//! below.
 
 use super::axes::Role;
 use super::rows::{Column, Rows};
@@ -6,15 +7,15 @@ use crate::print::plural;
 use crate::recording::HoleKind;
 use crate::warning::Warning;
 
-/// Most rows of a summary, besides one for each [`PART`] samples.
+/// Maximum number of summary rows, plus one for each [`PART`] samples.
 const ROWS: usize = 10;
-/// Samples for one row more.
+/// Number of samples per additional row.
 const PART: usize = 10;
-/// Samples for one stamp that may be missing among them.
+/// Number of samples per missing stamp allowed.
 const DENSE: usize = 100;
 
-/// Leaves out a first row that says how many follow, in each of several columns or beside an empty cell of
-/// time: it is no sample. Of the first rows only (not `is_all`), it may be.
+/// Removes a first row with the number of following rows, in each of several columns or next to an empty
+/// time cell: it is not a sample. With the first rows only (not `is_all`), it may be one.
 pub fn leave_out_count(rows: &mut Rows, is_all: bool) -> Option<Warning> {
     let below = rows.count.checked_sub(1).filter(|count| *count >= ROWS)? as f64;
     let mut first = rows
@@ -37,8 +38,8 @@ pub fn leave_out_count(rows: &mut Rows, is_all: bool) -> Option<Warning> {
     ))
 }
 
-/// Leaves out the rows behind the last time stamp whose cells of time hold texts or nothing: they are no
-/// samples. Columns of time that have stamps now and then only say nothing of that.
+/// Removes the rows after the last time stamp whose time cells contain texts or nothing: they are not
+/// samples. Time columns with only occasional stamps are ignored here.
 pub fn leave_out(rows: &mut Rows, roles: &[Role]) -> Option<Warning> {
     let times = || {
         let all = rows.columns.iter().zip(roles);
@@ -82,7 +83,7 @@ pub fn leave_out(rows: &mut Rows, roles: &[Role]) -> Option<Warning> {
     ))
 }
 
-/// Rows up to the last stamp.
+/// Number of rows up to the last stamp.
 fn stamped(column: &Column) -> Option<usize> {
     let last = column.values.iter().rposition(|value| value.is_finite())?;
     Some(last + 1)

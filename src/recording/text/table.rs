@@ -1,4 +1,4 @@
-//! One table of numbers with the lines above it: found by the first bytes of a text, then read.
+//! One table of numbers with the lines above it: found in the first bytes of a text, then read.
 
 mod counts;
 mod warnings;
@@ -23,69 +23,70 @@ use crate::recording::{AllSamples, Channel, TimeAxis};
 use crate::warning::Warning;
 use counts::Counts;
 
-/// Rows that tell what a column holds.
+/// Number of rows that determine the content of a column.
 const SAMPLE: usize = 400;
-/// Bytes of rows by which the columns and their time are told.
+/// Number of bytes of rows that determine the columns and their time.
 pub const FIRST_ROWS: usize = 1 << 16;
-/// Rows that these must be at least, of a table with many columns …
+/// Minimum number of these rows, for a table with many columns …
 const LEAST_ROWS: usize = 16;
 /// … unless they are longer than that.
 const MOST_BYTES: usize = 1 << 23;
 
-/// What is known beforehand of a maker's tables.
+/// Known defaults of a maker's tables.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Hints {
-    /// Unit of time where the files never name it.
+    /// Unit of time, if the files never name it.
     pub time_unit: Option<&'static str>,
-    /// Unit of the samples where the files never name it.
+    /// Unit of the samples, if the files never name it.
     pub unit: Option<&'static str>,
 }
 
-/// A table as its first rows and the lines above them show it.
+/// Layout of a table from its first rows and the lines above them.
 #[derive(Debug)]
 pub struct Layout {
     /// Its columns, and the keys and values above it.
     pub header: Header,
-    /// How its rows are read.
+    /// Parsing of its rows.
     pub plan: RowPlan,
-    /// What its columns are.
+    /// Roles of its columns.
     pub axes: AxisPlan,
-    /// Warnings of columns that hold a unit behind each number.
+    /// Warnings about columns with a unit after each number.
     pub with_units: Vec<Warning>,
-    /// Bytes before its first row.
+    /// Number of bytes before its first row.
     pub offset: usize,
     /// Line of its first row.
     pub line: usize,
-    /// Its first rows, and how many bytes they are.
+    /// Its first rows.
     pub first_rows: Rows,
     /// Bytes of the first rows.
     pub first_bytes: usize,
-    /// Zero bytes in the lines above it.
+    /// Number of zero bytes in the lines above it.
     zeros_above: usize,
-    /// Rows of each block, if the head says that there are several.
+    /// Number of rows of each block, if the header announces several.
     pub block_rows: Option<usize>,
     /// Why it cannot be read row by row, if so.
     pub held_whole: Option<&'static str>,
 }
 
-/// A table as read.
+/// A table after reading.
 #[derive(Debug)]
 pub struct ReadTable {
-    /// Its channels, for each block of rows in which time begins anew.
+    /// Its channels, for each block of rows in which time restarts.
     pub blocks: Vec<Vec<Channel>>,
-    /// Its head.
+    /// Its header.
     pub header: Header,
-    /// How its rows are written.
+    /// Format of its rows.
     pub dialect: Dialect,
-    /// If not all rows were kept: for each channel of the last block, what all of its samples come to.
+    /// If not all rows were kept: for each channel of the last block, statistics of all of its
+    /// samples.
     pub tails: Vec<Option<AllSamples>>,
-    /// What should be known.
+    /// Warnings.
     pub warnings: Vec<Warning>,
-    /// What is missing.
+    /// Missing data.
     pub lost: Option<Warning>,
-    /// Number of the line after it.
+    /// Number of the next line.
     pub next_line: usize,
-    /// Whether a line there repeats a key of the head.
+    /// Whether that line repeats a key of the header.
     pub begins_anew: bool,
 }
 
@@ -104,10 +105,10 @@ fn first_rows(chunks: &mut Chunks, offset: usize) -> Result<(&[u8], bool), Failu
 }
 
 impl Layout {
-    /// Finds the next table in a text; `line` is the number of the first line there.
+    /// Finds the next table in a text; `line` is the number of its first line.
     ///
     /// # Errors
-    /// If there is no table, or it leaves open how it is to be read.
+    /// If there is no table, or it is ambiguous.
     pub fn find(
         chunks: &mut Chunks,
         line: usize,
@@ -156,7 +157,7 @@ impl Layout {
         Ok(found)
     }
 
-    /// Reads the first rows and finds the time of the columns by them.
+    /// Parses the first rows and finds the time of the columns from them.
     fn look_at_first_rows(
         &mut self,
         chunks: &mut Chunks,
@@ -212,7 +213,7 @@ impl Layout {
         Ok(())
     }
 
-    /// Takes the large numbers of channels as they are.
+    /// Keeps the large numbers of channels unchanged.
     fn keep_offsets_of_time(&mut self, rows: &mut Rows) {
         let places = self
             .plan
@@ -257,10 +258,10 @@ impl Layout {
         roles.filter_map(|(place, role)| matches!(role, Role::Channel(_)).then_some(place))
     }
 
-    /// Reads the whole table, and keeps no more than about so many numbers of it.
+    /// Reads the whole table, keeping about `most` numbers of it.
     ///
     /// # Errors
-    /// Those of the input, and rows of too different lengths.
+    /// Those of the input, and rows of very different lengths.
     pub fn read(self, chunks: &mut Chunks, most: usize) -> Result<ReadTable, Failure> {
         chunks.skip(self.offset);
         let mut rows = Rows::default();
@@ -299,11 +300,11 @@ impl Layout {
         })
     }
 
-    /// Channels of rows as read, and what should be known of them.
+    /// Channels of parsed rows, with warnings.
     fn part_of(self, mut rows: Rows, tail: Option<Tail>) -> ReadTable {
         let mut skipped: Vec<Warning> = Vec::new();
         match &tail {
-            // What stands above and below the samples is told from all of them.
+            // Rows above and below the samples are detected from all of them.
             None => {
                 skipped.extend(summary::leave_out_count(&mut rows, true));
                 skipped.extend(summary::leave_out(&mut rows, &self.axes.roles));
@@ -388,7 +389,7 @@ impl Layout {
         places.collect()
     }
 
-    /// Judges a last line that has no line end, and takes it away if the file was cut within it.
+    /// Judges a last line without a line end, and removes it if the file was truncated within it.
     fn look_at_last_line(&self, piece: &mut Vec<u8>, first: usize) -> Option<Warning> {
         let judged = LastLine::of(piece, first == 1, &self.plan);
         let line = first + memchr::memchr_iter(b'\n', piece).count();
@@ -401,14 +402,14 @@ impl Layout {
 }
 
 impl ReadTable {
-    /// How many numbers of it were kept.
+    /// Number of values kept.
     pub fn numbers(&self) -> usize {
         let channels = self.blocks.iter().flatten();
         channels.map(|channel| channel.samples.len()).sum()
     }
 }
 
-/// A channel out of a column.
+/// A channel from a column.
 pub fn channel(field: &Field, mut column: Column, mut axis: TimeAxis) -> Channel {
     sparse::thin(&mut column, &mut axis);
     if let Some(stamps) = &axis.stamps_s
@@ -430,7 +431,7 @@ pub fn channel(field: &Field, mut column: Column, mut axis: TimeAxis) -> Channel
     }
 }
 
-/// What each column holds in the rows from a line on, and its first date or time.
+/// Content of each column in the rows from a line on, and its first date or time.
 fn column_kinds(
     head: &Head,
     table: &Table,
@@ -450,7 +451,7 @@ fn column_kinds(
     counts.into_iter().map(Counts::kind).collect()
 }
 
-/// The columns that follow names in other columns.
+/// Columns whose values are identified by names in other columns.
 fn named_items(head: &Head, header: &Header, first: usize, dialect: Dialect) -> Vec<Item> {
     let headings: Vec<&str> = header
         .fields
@@ -460,8 +461,8 @@ fn named_items(head: &Head, header: &Header, first: usize, dialect: Dialect) -> 
     items(&headings, &dialect.cells(&head.lines[first].text))
 }
 
-/// The first row: a row with something wrong in it may stand between the headings and the first good
-/// one; it belongs to the table, so that what is wrong is seen. A whole number alone may count the rows.
+/// The first row: a faulty row may be between the headings and the first good one; it belongs to the
+/// table, so that the fault is reported. A single integer may be the number of rows.
 fn first_row(head: &Head, table: &Table, header: &Header) -> usize {
     let Some(names) = &header.names else {
         return table.first;

@@ -1,4 +1,4 @@
-//! The rows of a long table behind those that are kept: read, summed up and forgotten.
+//! Rows of a long table after those that are kept: read, added to the statistics and dropped.
 
 use torqcomp_dsp::quality::sums::SampleSums;
 
@@ -9,23 +9,23 @@ use super::table::Layout;
 use crate::failure::Failure;
 use crate::recording::{AllSamples, Channel};
 
-/// What all rows of a table come to, of which only the first are kept.
+/// Statistics of all rows of a table of which only the first are kept.
 pub struct Tail {
-    /// Those of a piece.
+    /// Rows of a piece.
     rows: Rows,
-    /// Rows before the piece.
+    /// Number of rows before the piece.
     before: usize,
     notes: LineNotes,
     columns: Vec<ColumnSums>,
 }
 
-/// What the values of a column come to.
+/// Statistics of a column.
 #[derive(Debug, Clone, Copy, Default)]
 struct ColumnSums {
     sums: SampleSums,
-    /// Whether it is slower than the rows: its empty cells are no samples.
+    /// Whether it is slower than the rows, so that its empty cells are not samples.
     is_slow: bool,
-    /// Rows up to the last that had a value.
+    /// Number of rows up to the last with a value.
     filled: usize,
     first: Option<f64>,
     last: Option<f64>,
@@ -51,7 +51,7 @@ impl ColumnSums {
 }
 
 impl Tail {
-    /// What follows rows that are kept.
+    /// Statistics starting with the rows that are kept.
     pub fn behind(kept: &Rows, layout: &Layout) -> Self {
         let columns = kept.columns.iter().map(|column| {
             let mut sums = ColumnSums {
@@ -76,15 +76,15 @@ impl Tail {
         self.rows.line
     }
 
-    /// What should be known of the lines.
+    /// Notes about the lines.
     pub fn notes(&self) -> &LineNotes {
         &self.notes
     }
 
-    /// Reads the lines of a piece; returns the bytes read.
+    /// Reads the lines of a piece; returns the number of bytes consumed.
     ///
     /// # Errors
-    /// Rows of too different lengths.
+    /// Rows of very different lengths.
     pub fn read(&mut self, text: &[u8], plan: &RowPlan) -> Result<usize, Failure> {
         let line = self.rows.line;
         self.rows.begin(line, plan.kinds.len());
@@ -97,7 +97,7 @@ impl Tail {
         Ok(end)
     }
 
-    /// What all samples of each channel of the kept rows come to.
+    /// Statistics of all samples of each channel of the kept rows.
     pub fn of_channels(&self, layout: &Layout, kept: &[Channel]) -> Vec<Option<AllSamples>> {
         let roles = layout.axes.roles.iter().enumerate();
         let places = roles.filter_map(|(place, role)| match role {

@@ -1,4 +1,5 @@
-//! What samples cannot show: `tests/recordings` has a file of every dialect, with what is expected of it.
+//! Cases not covered by samples: `tests/recordings` has a file of every dialect, with the expected
+//! result.
 
 use proptest::prelude::*;
 
@@ -71,7 +72,7 @@ const SAMPLES: [&str; 6] = [
 ];
 
 proptest! {
-    /// Whatever is changed, left out or put in, reading ends with a recording or a message.
+    /// Whatever is changed, removed or inserted, reading ends with a recording or a message.
     #[test]
     fn nothing_makes_it_panic(
         sample in 0..SAMPLES.len(),

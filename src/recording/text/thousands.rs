@@ -1,16 +1,16 @@
-//! Marks between thousands that read as decimal marks too: `1,234` and `1.234`.
+//! Thousands separators that are also valid as decimal marks: `1,234` and `1.234`.
 
 use super::cell::Cell;
 use super::dialect::{Dialect, is_skipped};
 use super::head::{Head, Table};
 use crate::failure::{ErrorCode, Failure};
 
-/// Digits of a group.
+/// Digits per group.
 const GROUP: usize = 3;
 
-/// Refuses a table whose decimal mark may stand between thousands: a comma that reads both ways in all rows, or a point
-/// in a column beside whole numbers of up to three digits, or beside commas that read both ways. `others` are the tables
-/// that read as many rows, with marks between thousands.
+/// Rejects a table whose decimal mark may be a thousands separator: a comma that is ambiguous in all rows, or a point
+/// in a column with integers of up to three digits, or with ambiguous commas. `others` are the tables that read as many
+/// rows, with thousands separators.
 ///
 /// # Errors
 /// If the table is such a one.
@@ -43,9 +43,9 @@ pub(super) fn refuse(head: &Head, table: &Table, others: &[&Table]) -> Result<()
     .line(head.number(place)))
 }
 
-/// Where the first number of a column stands whose points look like those between thousands: each has three digits
-/// behind it and no zero before it, and the numbers without one are whole and have no more than three digits. Numbers
-/// with as many decimals each have a point in all of them, and those with as many as they need have other counts.
+/// Location of the first number of a column whose points look like thousands separators: each is followed by three
+/// digits and not preceded by a zero, and the numbers without one are integers of at most three digits. Numbers with
+/// a fixed number of decimals have a point in all of them, and those with as many as needed have other counts.
 fn grouped_place(head: &Head, table: &Table, other: Dialect) -> Option<usize> {
     let mut columns = vec![Column::default(); table.width];
     for (place, line) in head.lines.iter().enumerate().skip(table.first) {
@@ -60,7 +60,7 @@ fn grouped_place(head: &Head, table: &Table, other: Dialect) -> Option<usize> {
     columns.find_map(|c| c.grouped.filter(|_| c.has_plain && !c.has_others))
 }
 
-/// Where the first number stands that has commas between thousands.
+/// Location of the first number with commas as thousands separators.
 fn comma_place(head: &Head, table: &Table) -> Option<usize> {
     let has_comma = |text: &str| {
         text.contains(',') && matches!(Cell::read(text, table.dialect.decimal), Cell::Grouped(_))
@@ -71,12 +71,12 @@ fn comma_place(head: &Head, table: &Table) -> Option<usize> {
     found.map(|(place, _)| place)
 }
 
-/// What the numbers of a column look like.
+/// Format of the numbers of a column.
 #[derive(Default, Clone)]
 struct Column {
-    /// The line of the first one with marks between thousands.
+    /// The line of the first one with thousands separators.
     grouped: Option<usize>,
-    /// Whether some are whole and too small for a mark.
+    /// Whether some are integers too small for a separator.
     has_plain: bool,
     /// Whether there is anything else.
     has_others: bool,

@@ -1,4 +1,4 @@
-//! Units and headings as recorders write them, in English, German and some other languages.
+//! Units and headings as written by recorders, in English, German and some other languages.
 
 use torqcomp_model::{Dimension, RatioOf, Unit};
 
@@ -10,7 +10,7 @@ pub use super::axis_names::{
 use super::heading::split;
 use super::vocabulary::{has, meaning};
 
-/// Reads a unit, in brackets or not.
+/// Parses a unit, in brackets or not.
 #[must_use]
 pub fn read(text: &str) -> Option<NamedUnit> {
     let text = unbracketed(text);
@@ -38,12 +38,12 @@ pub fn read(text: &str) -> Option<NamedUnit> {
     })
 }
 
-/// Whether a text in the place of a unit says that there is none.
+/// Whether a text in place of a unit means none.
 fn says_none(text: &str) -> bool {
     text.is_empty() || has("no units", &text.to_lowercase())
 }
 
-/// A unit as written, if the cell names one at all.
+/// A unit as written, if the cell contains one at all.
 #[must_use]
 pub fn as_written(text: &str) -> Option<String> {
     let text = unbracketed(text);
@@ -61,26 +61,26 @@ fn unbracketed(text: &str) -> &str {
     text
 }
 
-/// Whether a text stands in brackets as a whole.
+/// Whether a text is wholly in brackets.
 #[must_use]
 pub fn is_bracketed(text: &str) -> bool {
     let text = text.trim();
     text.len() > 2 && unbracketed(text).len() < text.len() && !text.starts_with('"')
 }
 
-/// What a heading says.
+/// Content of a heading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Heading {
     /// The name without the unit.
     pub name: String,
-    /// The unit, if it is known.
+    /// The unit, if known.
     pub unit: Option<NamedUnit>,
     /// The unit as written.
     pub unit_text: Option<String>,
 }
 
-/// Reads a heading: what [`split`] knows, and `C1 in V`, `U/V`, `Kraft, N`,
-/// `Torque Nm`, a unit in brackets before other words, units in square brackets that are not known.
+/// Parses a heading: the formats of [`split`], and `C1 in V`, `U/V`, `Kraft, N`, `Torque Nm`, a
+/// unit in brackets before other words, unknown units in square brackets.
 #[must_use]
 pub fn heading(text: &str) -> Heading {
     // "Zeit" t / s
@@ -98,7 +98,7 @@ pub fn heading(text: &str) -> Heading {
         }
         return Heading::new(name, None, None);
     }
-    // CH1V, as Rigol writes it.
+    // CH1V, as written by Rigol.
     if let Some((name, unit)) = text.split_at_checked(text.len().saturating_sub(1))
         && matches!(unit, "V" | "A")
         && name
@@ -145,8 +145,8 @@ pub fn heading(text: &str) -> Heading {
     Heading::new(text.to_owned(), time_word(text), None)
 }
 
-/// Name and unit of a heading that ends in a ratio of voltages or lengths, whose bar parts no name from a unit:
-/// `bridge mV/V`, `eps_µm/m`.
+/// Name and unit of a heading that ends in a ratio of voltages or lengths, whose slash does not separate a name
+/// from a unit: `bridge mV/V`, `eps_µm/m`.
 fn ratio(text: &str) -> Option<(&str, NamedUnit)> {
     let above = text.rfind('/')?;
     let start = text[..above].trim_end().rfind([' ', '_', ',', ';', ':'])?;
@@ -163,7 +163,7 @@ fn ratio(text: &str) -> Option<(&str, NamedUnit)> {
     (is_ratio && !name.is_empty()).then(|| (name.trim(), unit))
 }
 
-/// Whether a unit can stand behind a text: not behind a number (`lowpass 100 Hz`) nor a word that asks for more
+/// Whether a unit can follow a text: not after a number (`lowpass 100 Hz`) nor a word that requires more
 /// (`mV per Nm`).
 fn can_end_before_unit(name: &str) -> bool {
     let last = name.rsplit(' ').next().unwrap_or_default();
@@ -172,12 +172,12 @@ fn can_end_before_unit(name: &str) -> bool {
     !is_number && !is_open && !["per", "pro", "at", "bei", "par"].contains(&last)
 }
 
-/// Whether a word is a speed, so that its bar parts no name from a unit.
+/// Whether a word is a speed, so that its slash does not separate a name from a unit.
 fn is_speed(word: &str) -> bool {
     has("speeds", &word.to_lowercase())
 }
 
-/// The unit of time that is part of a name of time: `millis`, `Time ms`, `elapsed seconds`.
+/// The unit of time within a name of time: `millis`, `Time ms`, `elapsed seconds`.
 fn time_word(text: &str) -> Option<NamedUnit> {
     let lower = spaced(text).to_lowercase();
     let mut words = lower
@@ -209,8 +209,8 @@ impl Heading {
     }
 }
 
-/// The heading without a bracket in it that holds a unit, and what the bracket holds. Square brackets
-/// hold units, round ones only those that are known or that are no words.
+/// The heading without a bracket that contains a unit, and its content. Square brackets contain
+/// units, round ones only known units or non-words.
 fn bracket(text: &str) -> Option<(String, &str)> {
     for (open, close) in [('[', ']'), ('(', ')')] {
         for (start, _) in text.match_indices(open) {
@@ -246,7 +246,7 @@ fn bracket(text: &str) -> Option<(String, &str)> {
     None
 }
 
-/// Seconds of a unit of time with a factor in a heading: 0.01 of `Zeit [1/100 s]`, `Zeit x10ms` and `Time (s) x1e-2`.
+/// Seconds per unit of time with a factor in a heading: 0.01 for `Zeit [1/100 s]`, `Zeit x10ms` and `Time (s) x1e-2`.
 #[must_use]
 pub fn scaled_time(heading: &str) -> Option<f64> {
     let mut parts = heading.split(['[', '(', ']', ')']).skip(1);
@@ -267,7 +267,7 @@ pub fn scaled_time(heading: &str) -> Option<f64> {
     (rest.is_empty()).then_some(factor * unit_of(inside?)?)
 }
 
-/// The factor that a text begins with, and the rest: `1/100 s`, `x10ms`, `1e-3 s`, `10^-3 s`.
+/// The factor at the start of a text, and the rest: `1/100 s`, `x10ms`, `1e-3 s`, `10^-3 s`.
 fn factor(text: &str) -> Option<(f64, &str)> {
     let text = text.trim().trim_start_matches(['x', '×', '*']).trim_start();
     let is_part =

@@ -1,24 +1,24 @@
-//! Rows above those that a table was found by: a text in one cell neither begins nor ends a table.
+//! Rows above those by which a table was found: a single text cell neither begins nor ends a table.
 
 use super::cell::Cell;
 use super::dialect::is_skipped;
 use super::head::{Head, Table};
 
-/// What a line above a table is to it.
+/// Relation of a line above a table to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Above {
-    /// A row as those of the table.
+    /// A row like those of the table.
     Row,
-    /// A row with texts in place of numbers: an overload, a lost connection.
+    /// A row with texts instead of numbers: an overload, a lost connection.
     WithTexts,
-    /// Texts alone, one for each column.
+    /// Texts only, one for each column.
     Headings,
     /// Anything else.
     Other,
 }
 
-/// Place of the first row, from the one that the table was found by upwards: over rows in which some cells hold texts,
-/// up to a row without any, or to the headings.
+/// Index of the first row, searched upwards from the one by which the table was found: over rows in which some cells
+/// contain texts, up to a row without texts, or to the headings.
 pub(super) fn first_row(head: &Head, table: &Table) -> usize {
     let cells = |line: usize| -> Vec<Cell> {
         let mut cells: Vec<Cell> = table

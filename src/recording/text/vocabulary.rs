@@ -1,9 +1,9 @@
-//! The words that recorders write, by what they mean: the lists of `vocabulary.txt`.
+//! Words used by recorders, by meaning: the lists of `vocabulary.txt`.
 
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-/// A word and what it means, where its list does not say that.
+/// A word and its meaning, if the list does not imply it.
 pub struct Word {
     pub text: &'static str,
     pub meaning: &'static str,
@@ -25,7 +25,7 @@ pub fn has(list: &str, word: &str) -> bool {
     words(list).iter().any(|known| known.text == word)
 }
 
-/// What a word means by a list.
+/// Meaning of a word in a list.
 pub fn meaning(list: &str, word: &str) -> Option<&'static str> {
     let known = words(list).iter().find(|known| known.text == word);
     known.map(|known| known.meaning)

@@ -144,7 +144,7 @@ fn what_the_constants_share_is_no_part_of_the_response() {
              stiffness = {{ value = \"100 N m/rad\", std = \"13 N m/rad\" }}\ncommon_std = {common}\n"
         )
     };
-    // Of 13 N m/rad, 5 % of 100 are shared: √(13² − 5²) = 12 are left.
+    // Of 13 N m/rad, 5 % of 100 are common: √(13² − 5²) = 12 remain.
     let std = parse("s", &with("\"0.05\""))
         .unwrap()
         .mechanics

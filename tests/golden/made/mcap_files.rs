@@ -1,4 +1,4 @@
-//! MCAP files of every encoding, written by the crate `mcap`: one signal of 1 kHz, and what is usual beside it.
+//! MCAP files of every encoding, written by the crate `mcap`: one signal at 1 kHz, with typical other content.
 
 use std::f64::consts::TAU;
 
@@ -190,7 +190,7 @@ fn protobuf() -> Vec<u8> {
     file.finish()
 }
 
-/// A hundred samples a message, with their spacing.
+/// A hundred samples per message, with their spacing.
 fn blocks() -> Vec<u8> {
     let mut file = McapFile::new(Some(Compression::Zstd), "", "golden");
     let text = b"float64 dt\nfloat64[] data".as_slice();

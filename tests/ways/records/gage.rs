@@ -24,7 +24,7 @@ const ORDERS: [(f64, f64, f64); 4] = [
 ];
 const SLOW_HZ: f64 = 21.0;
 const FAST_HZ: f64 = 31.0;
-/// Samples until the motor runs evenly.
+/// Number of samples until the motor runs steadily.
 const BEFORE: usize = 4000;
 
 pub(super) fn way() -> Way {
@@ -61,7 +61,7 @@ fn load() -> Vec<u8> {
     text.into()
 }
 
-/// Volts of a torque, which has acted for so many samples when the record begins.
+/// Volts for a torque that has acted for `before` samples when the record begins.
 fn record(torque: &dyn Fn(f64) -> f64, before: usize, count: usize, seed: u64) -> Vec<u8> {
     let earlier = before as f64 / RATE_HZ;
     let shown = STAND.shows(|t| torque(t - earlier), RATE_HZ, before + count);

@@ -13,10 +13,10 @@ const STAND: Plant = Plant {
 const N_M_PER_VOLT: f64 = 7.46;
 const NOISE_V: f64 = 2e-4;
 const ARM_M: f64 = 0.12;
-/// Half a sine squared: the recorder's low-pass leaves no corners.
+/// Squared half-sine: no corners remain after the recorder's low-pass.
 const HIT_S: f64 = 0.0016;
 const RATE_HZ: f64 = 10_000.0;
-/// A hit about every half second, never quite alike.
+/// A hit about every half second, slightly varying.
 const HITS: [(f64, f64); 5] = [
     (0.21, 310.0),
     (0.74, 265.0),
@@ -26,7 +26,7 @@ const HITS: [(f64, f64); 5] = [
 ];
 
 pub(super) fn way() -> Way {
-    // A compression stroke every 25 ms, over the torque that keeps the compressor going.
+    // A compression stroke every 25 ms, on top of the torque that drives the compressor.
     let run = |t: f64| {
         let since = (t - 0.1).rem_euclid(0.025);
         let stroke = pulse(since, 0.006);

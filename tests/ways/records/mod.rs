@@ -1,5 +1,5 @@
-//! Recordings of the five worked ways in `docs/ways`, made by integrating the stand's equation of motion; nothing of
-//! torqcomp is used.
+//! Recordings of the five worked examples in `docs/ways`, made by integrating the stand's equation of motion,
+//! independent of torqcomp.
 
 mod bag;
 mod bridge;
@@ -8,7 +8,7 @@ mod hammer;
 mod stand;
 mod transducer;
 
-/// One worked way: its recordings and the torque that they were made from.
+/// One worked example: its recordings and the torque that they were made from.
 pub struct Way {
     /// Name of the page and of the folder.
     pub name: &'static str,

@@ -1,20 +1,20 @@
-//! A stand that is integrated in time, and the files of a recorder.
+//! A stand integrated in time, and the files of a recorder.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
 use crate::noise::Noise;
 
-/// `J θ'' + f θ' + K θ = T`, of which the gage shows `K θ`; divided by `K`, only two constants are left.
+/// `J θ'' + f θ' + K θ = T`, where the gage shows `K θ`; divided by `K`, only two constants remain.
 pub struct Plant {
     pub natural_hz: f64,
     pub damping_ratio: f64,
 }
 
 impl Plant {
-    /// The torque at the gage, N m, under a torque over time that begins at rest.
+    /// The torque at the gage, N m, from rest under a torque over time.
     ///
-    /// Method of Runge and Kutta, fourth order, at 40 steps an oscillation or more.
+    /// Fourth-order Runge–Kutta method, at 40 steps per oscillation or more.
     pub fn shows(&self, torque: impl Fn(f64) -> f64, rate_hz: f64, count: usize) -> Vec<f64> {
         let omega = TAU * self.natural_hz;
         let steps = (40.0 * self.natural_hz / rate_hz).ceil().max(4.0);
@@ -44,7 +44,7 @@ impl Plant {
     }
 }
 
-/// A pulse as of a hammer: half a sine, 1 at its top.
+/// A hammer pulse: a half-sine with a peak of 1.
 pub fn pulse(since_s: f64, length_s: f64) -> f64 {
     if (0.0..length_s).contains(&since_s) {
         (TAU / 2.0 * since_s / length_s).sin()
@@ -53,13 +53,13 @@ pub fn pulse(since_s: f64, length_s: f64) -> f64 {
     }
 }
 
-/// From 0 to 1 within a time, without a kink.
+/// Smooth rise from 0 to 1 within a time.
 pub fn rise(since_s: f64, length_s: f64) -> f64 {
     let part = (since_s / length_s).clamp(0.0, 1.0);
     part * part * part * (10.0 + part * (6.0 * part - 15.0))
 }
 
-/// What a recorder stores of values: with noise, in steps of its resolution.
+/// Values as stored by a recorder: with noise and quantisation.
 pub fn recorded(values: &[f64], noise_rms: f64, step: f64, seed: u64) -> Vec<f64> {
     let mut noise = Noise(seed);
     let mut stored = |value: &f64| ((value + noise_rms * noise.normal()) / step).round() * step;

@@ -15,7 +15,7 @@ const NOISE_V: f64 = 5e-4;
 const RATE_HZ: f64 = 20_000.0;
 
 pub(super) fn way() -> Way {
-    // Three levels, 4 ms from one to the next, with the ripple of slots and of the current's harmonics.
+    // Three levels with transitions of 4 ms, with the ripple of slots and of the current's harmonics.
     let run = |t: f64| {
         let level = 5.0 + 15.0 * rise(t - 0.15, 0.004) - 10.0 * rise(t - 0.35, 0.004);
         let ripple = |hz: f64, phase: f64| (TAU * hz * t + phase).cos();

@@ -1,88 +1,89 @@
-//! The band that suits a record and a stand.
+//! The optimum band for a record and a stand.
 //!
-//! What a band `W(f)` leaves wrong is the torque that it cuts off and the noise that the inverse response multiplies
-//! within it:
+//! The error of a band `W(f)` consists of the torque that it cuts off and the noise within it, amplified by the inverse
+//! response:
 //!
 //! ```text
 //! e²(W) = ∫ |H⁻¹|² [ (1 − W)² (P − N) + W² N ] df
 //! ```
 //!
-//! with the record's density `P`, the density `N` of its noise, and so that of the torque `|H⁻¹|² (P − N)`. The band with
-//! the least `e²` is taken from a grid of rounded frequencies, about 2.4 % apart. `P − N` is used with its sign: where
-//! there is only noise it is zero on the average, so that extending the band by many lines never pays by chance, and one
-//! line decides only if it is larger than all the noise up to it.
+//! with the record's density `P` and the density `N` of its noise, so that the torque has `|H⁻¹|² (P − N)`. The band
+//! with the smallest `e²` is taken from a grid of rounded frequencies, about 2.4 % apart. `P − N` keeps its sign: where
+//! there is only noise it averages to zero, so that extending the band by many lines never pays by chance, and a single
+//! line decides only if it exceeds all the noise up to it.
 //!
-//! `N` is white. It is taken from where the record is weakest: the mean of the three least medians of 16 equal parts
-//! between 2 and 98 % of half the rate.
+//! `N` is white. It is estimated where the record is weakest: the mean of the three smallest medians of 16 equal parts
+//! between 2 and 98 % of the Nyquist frequency.
 //!
-//! Rounding to steps `q` adds `q²/12` (W. R. Bennett, *Bell Syst. Tech. J.* 27 (1948), 446), white where noise spreads it.
-//! Where a quiet record repeats itself, it stands in lines far above the noise instead. Lines above a frequency that all
-//! together have no more power than that are no signal there: `N` is then `q²/(6 f_s)`, and `P` no more.
+//! Rounding to steps `q` adds `q²/12` (W. R. Bennett, *Bell Syst. Tech. J.* 27 (1948), 446), white if noise dithers it.
+//! In a quiet periodic record, it forms lines far above the noise instead. If all lines above a frequency together have
+//! no more power than that, they are not signal: `N` is then `q²/(6 f_s)`, and `P` no larger.
 
 use super::{Band, EDGE, Edge, FALLBACK_FRACTION};
 use crate::compensate::Inverse;
 use crate::quality::quantisation::quantisation;
 use crate::spectrum::{Density, welch_steep};
 
-/// Frequencies of the grid a decade.
+/// Grid frequencies per decade.
 const PER_DECADE: i32 = 96;
 /// Lines of the density below the lowest band.
 const LOWEST_LINES: f64 = 4.0;
-/// Lines that a mean and its window's main lobe take up.
+/// Lines occupied by the mean with the window's main lobe.
 const MEAN_LINES: usize = 3;
-/// Parts of the spectrum that noise is looked for in, and how many of them are taken.
+/// Parts of the spectrum for the noise estimate, and how many of them are used.
 const FLOOR_PARTS: usize = 16;
 const FLOOR_TAKEN: usize = 3;
-/// Part of half the rate in which noise is looked for.
+/// Range for the noise estimate, as fractions of the Nyquist frequency.
 const FLOOR_RANGE: [f64; 2] = [0.02, 0.98];
 /// Shortest and longest block of the density.
 const BLOCKS: [usize; 2] = [64, 1 << 15];
-/// Blocks that a record is long, at least.
+/// Minimum length of a record, in blocks.
 const RECORD_BLOCKS: usize = 4;
-/// Power of lines over that of rounding up to which they may be due to it: an error of a few levels is not spread evenly.
+/// Largest power of lines, relative to that of rounding, that rounding may explain: an error of a few levels is not
+/// spread evenly.
 const ROUNDING: f64 = 2.0;
-/// Signal over its standard deviation from noise alone, below which a record holds none.
+/// Significance threshold of the signal, in standard deviations due to noise alone.
 const SIGNIFICANT: f64 = 6.0;
-/// Gain for noise up to which a band reaches that is chosen without a record.
+/// Noise gain that limits a band chosen without a record.
 const STAND_GAIN: f64 = 10.0;
 
-/// A band and what it costs, in the units of the record at rest.
+/// A band and its expected errors, in static units of the record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BandChoice {
-    /// Upper end of the part that is compensated in full, in Hz.
+    /// Upper end of the fully compensated range, in Hz.
     pub top_hz: f64,
-    /// Expected noise within the band after compensation, rms.
+    /// Expected RMS noise within the band after compensation.
     pub noise_rms: f64,
-    /// Expected torque that the band cuts off, rms.
+    /// Expected RMS torque above the band.
     pub lost_rms: f64,
 }
 
 impl BandChoice {
-    /// Expected error of the compensated record, rms.
+    /// Expected RMS error of the compensated record.
     #[must_use]
     pub fn error_rms(&self) -> f64 {
         self.noise_rms.hypot(self.lost_rms)
     }
 }
 
-/// A record's spectrum, divided by a stand's response.
+/// Spectrum of a record and the inverse response of a stand.
 #[derive(Debug, Clone)]
 pub struct BandSearch {
     pub(super) rate_hz: f64,
     pub(super) step_hz: f64,
-    /// `|H⁻¹|²` at each line, as far as it is finite; zero for the mean.
+    /// `|H⁻¹|²` at each line where it is finite; zero for the mean.
     pub(super) power_gain: Vec<f64>,
     pub(super) density: Vec<f64>,
     pub(super) floor: f64,
-    /// Sums of `|H⁻¹|²` and of `|H⁻¹|² P` over the lines before each.
+    /// Cumulative sums of `|H⁻¹|²` and of `|H⁻¹|² P` up to each line.
     sums: Vec<[f64; 2]>,
-    /// Whether the record holds more than noise.
+    /// Whether the record contains more than noise.
     has_signal: bool,
     edge: &'static Edge,
 }
 
 impl BandSearch {
-    /// Of a record: torque at rest in any unit. `None` if it has too few samples for a spectrum.
+    /// From a record, in static units of torque. `None` if it has too few samples for a spectrum.
     #[must_use]
     pub fn of_record(samples: &[f64], rate_hz: f64, inverse: &Inverse) -> Option<Self> {
         let [shortest, longest] = BLOCKS;
@@ -99,7 +100,7 @@ impl BandSearch {
         Some(search)
     }
 
-    /// Counts lines that may be due to rounding as noise.
+    /// Treats lines that rounding may explain as noise.
     fn count_rounding(&mut self, rounding_power: f64) {
         let lines = self.density.len();
         let spread = rounding_power / (lines as f64 * self.step_hz);
@@ -118,7 +119,7 @@ impl BandSearch {
         self.sum();
     }
 
-    /// Of the density of a record. `None` if it has too few lines or no noise.
+    /// From the density of a record. `None` if it has too few lines or no noise.
     #[must_use]
     pub fn of_density(density: &Density, rate_hz: f64, inverse: &Inverse) -> Option<Self> {
         let floor = white_floor(density)?;
@@ -143,7 +144,7 @@ impl BandSearch {
         Some(search)
     }
 
-    /// Adds up the lines.
+    /// Computes the cumulative sums.
     pub(super) fn sum(&mut self) {
         let (mut gains, mut record) = (0.0, 0.0);
         self.sums = vec![[0.0; 2]];
@@ -154,13 +155,13 @@ impl BandSearch {
         }
     }
 
-    /// `|H⁻¹|²` at the lowest frequency behind the mean.
+    /// `|H⁻¹|²` at the lowest frequency above the mean.
     pub(super) fn gain_at_rest(&self) -> f64 {
         let first = self.power_gain.iter().find(|gain| **gain > 0.0);
         first.copied().unwrap_or(f64::INFINITY)
     }
 
-    /// The band with the least expected error; `None` if the record holds nothing but noise.
+    /// The band with the smallest expected error; `None` if the record contains only noise.
     #[must_use]
     pub fn best(&self) -> Option<BandChoice> {
         if !self.has_signal {
@@ -175,8 +176,8 @@ impl BandSearch {
             .map(|(top_hz, squares)| choice(top_hz, squares))
     }
 
-    /// Mean squares of the noise within a band and of the torque beyond it; the latter scatters about zero where there
-    /// is none.
+    /// Mean squares of the noise within a band and of the torque above it; without torque the latter scatters about
+    /// zero.
     fn squares(&self, top_hz: f64) -> [f64; 2] {
         let end_hz = Band::end_of(self.rate_hz, top_hz);
         let lines = self.power_gain.len();
@@ -196,7 +197,8 @@ impl BandSearch {
     }
 }
 
-/// The band of a stand alone: as far as `|H⁻¹|` stays below 10, at most 0.7 of half the rate.
+/// The band for a stand alone: up to where `|H⁻¹|` reaches 10, at most 0.7 of the Nyquist
+/// frequency.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -224,7 +226,7 @@ fn choice(top_hz: f64, [noise, lost]: [f64; 2]) -> BandChoice {
     }
 }
 
-/// Frequencies of three significant digits, `10^(k/96)` rounded, within limits.
+/// Frequencies `10^(k/96)` rounded to three significant digits, within limits.
 fn grid(from_hz: f64, to_hz: f64) -> impl Iterator<Item = f64> {
     let place = |hz: f64| (f64::from(PER_DECADE) * hz.log10()).round() as i32;
     let rounded = |k: i32| {
@@ -263,7 +265,7 @@ fn white_floor(density: &Density) -> Option<f64> {
     (floor > 0.0).then_some(floor)
 }
 
-/// Whether the sum of all lines differs from that of noise, or one of them does.
+/// Whether the sum of all lines differs from noise, or a single one does.
 fn has_signal(density: &Density, floor: f64) -> bool {
     let values = &density.values[MEAN_LINES.min(density.values.len())..];
     let scatter = floor / (density.blocks as f64).sqrt();
@@ -290,7 +292,7 @@ mod tests {
         Arc::new(|hz| Complex64::new(1.0 + (hz / 100.0).powi(2), 0.0))
     }
 
-    /// Density of white noise 1 with a torque's band of 100 up to a frequency, at 5 Hz.
+    /// Density of white noise 1 plus a torque band of 100 up to a frequency, with 5 Hz resolution.
     fn flat(to_hz: f64, at: impl Fn(f64) -> f64) -> Density {
         let value = |line: usize| {
             let hz = 5.0 * line as f64;
@@ -310,7 +312,7 @@ mod tests {
     #[test]
     fn the_band_ends_where_the_signal_does() {
         let found = best(&flat(400.0, |_| 0.0)).unwrap();
-        // Within the edge little of the signal is lost, and above it only noise would be gained.
+        // Within the edge little of the signal is lost; above it there would be only more noise.
         assert!((360.0..=410.0).contains(&found.top_hz), "{found:?}");
         // ∫ (1 + (f/100)²)² df = f + 2f³/3e4 + f⁵/5e8 = 23 747 up to 400 Hz; the edge adds to it.
         assert!(
@@ -321,7 +323,7 @@ mod tests {
 
     #[test]
     fn a_chance_line_does_not_decide_and_a_strong_one_does() {
-        // Noise up to 3000 Hz costs about 3000⁵/5e8 = 4.9e8; a line of 5 Hz there brings 5 · 901² = 4.1e6 for each unit.
+        // Noise up to 3000 Hz costs about 3000⁵/5e8 = 4.9e8; a 5 Hz line there gains 5 · 901² = 4.1e6 per unit.
         let line = |size: f64| flat(400.0, move |hz| if hz == 3000.0 { size } else { 0.0 });
         assert!(best(&line(60.0)).unwrap().top_hz < 420.0);
         assert!(best(&line(600.0)).unwrap().top_hz > 2500.0);
@@ -334,7 +336,7 @@ mod tests {
         assert!(BandSearch::of_record(&[1.0; 10_000], RATE, &inverse()).is_none());
     }
 
-    /// Two sines of 3 and 1.5 steps at 50 and 150 Hz, rounded without noise to spread it: lines at all multiples of 50 Hz.
+    /// Two sines of 3 and 1.5 steps at 50 and 150 Hz, rounded without dither: lines at all multiples of 50 Hz.
     #[test]
     fn lines_of_rounding_are_no_signal() {
         let angle = |i: usize| std::f64::consts::TAU * 50.0 * i as f64 / RATE;

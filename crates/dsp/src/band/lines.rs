@@ -1,38 +1,38 @@
-//! Whether a few narrow lines alone decide a band.
+//! Detection of a few narrow lines that alone determine a band.
 
 use super::Band;
 use super::choice::BandSearch;
 
-/// Bands further apart than this ratio differ.
+/// Ratio of bands below which they count as different.
 const APART: f64 = 0.7;
-/// Gain `|H⁻¹|`, over that at rest, below which a line is not worth a question.
+/// Gain `|H⁻¹|`, relative to its static value, below which lines are not examined.
 const LARGE_GAIN: f64 = 10.0;
-/// Most lines that are taken out.
+/// Maximum number of removed lines.
 const MOST_LINES: usize = 12;
-/// Lines of the density that a window makes of a steady one, on either side.
+/// Half-width of a steady line in lines of the density, due to the window.
 const LOBE: usize = 4;
-/// How far to either side a line may be wide, relative to its frequency: a switching frequency that wavers.
+/// Largest half-width of a line, relative to its frequency, as for a switching frequency that wanders.
 const WIDTH: f64 = 0.01;
-/// Density over the floor up to which a line reaches.
+/// Density, relative to the floor, at which a line ends.
 const RISEN: f64 = 4.0;
 
-/// Lines without which a band would end far below.
+/// Lines without which the band would be much narrower.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DecidingLines {
     /// Number of lines.
     pub count: usize,
-    /// Frequency of the one that makes up most of the result, in Hz.
+    /// Frequency of the strongest of them in the result, in Hz.
     pub frequency_hz: f64,
-    /// What all of them make up of the compensated record, rms: `√(∑ |H⁻¹|² (P − N) Δf)`.
+    /// Their RMS contribution to the compensated record: `√(∑ |H⁻¹|² (P − N) Δf)`.
     pub result_rms: f64,
-    /// Upper end of the band that is best without them, in Hz.
+    /// Upper end of the optimum band without them, in Hz.
     pub without_hz: f64,
 }
 
 impl BandSearch {
-    /// The narrow lines at the upper end of a band without which the band would be less than 0.7 times as wide, where the
-    /// inverse response is more than 10 times that at rest. Such lines may be torque, or picked up from a power converter:
-    /// the record alone cannot tell.
+    /// The narrow lines at the upper end of a band without which the band would be less than 0.7 times as wide, where
+    /// the inverse response exceeds 10 times its static value. Such lines may be torque or interference from a power
+    /// converter; the record alone cannot distinguish them.
     ///
     /// A line of 0.02 at 1600 Hz above a torque that ends at 100 Hz, on a stand with `|H⁻¹| = 1 + (f/100)²`:
     /// ```
@@ -77,7 +77,8 @@ impl BandSearch {
         None
     }
 
-    /// The line at the upper end of a band that makes up most of the result, if it is amplified.
+    /// The line at the upper end of a band with the largest contribution to the result, if it is
+    /// amplified.
     fn strongest_near(&self, top_hz: f64) -> Option<usize> {
         let least = LARGE_GAIN * LARGE_GAIN * self.gain_at_rest();
         let [from, end] = [APART * top_hz, Band::end_of(self.rate_hz, top_hz)]
@@ -87,7 +88,7 @@ impl BandSearch {
         (self.power_gain[strongest] > least).then_some(strongest)
     }
 
-    /// Puts noise in the place of a line; its power in the result.
+    /// Replaces a line by noise; returns its power in the result.
     fn take_out(&mut self, line: usize) -> f64 {
         let reach = LOBE.max((WIDTH * line as f64) as usize);
         let risen = |k: &usize| self.density[*k] > RISEN * self.floor;

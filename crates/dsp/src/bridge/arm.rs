@@ -5,10 +5,9 @@ use crate::gage::BondedGage;
 
 /// Relative change of an active arm, `δ(ε) = a + b ε + c ε²`.
 ///
-/// `a` (-) is the change at no load, `b` (-) the gage factor referred to the
-/// unstrained arm, `c` (-) the curvature; ε (m/m) the strain from the bonded
-/// state. Holds a foil gage (a = c = 0) and, exactly, the bonded semiconductor
-/// gage of thesis Appendix B.
+/// `a` (-) is the change at no load, `b` (-) the gage factor referred to the unstrained arm, `c`
+/// (-) the curvature; ε (m/m) the strain from the bonded state. Covers a foil gage (a = c = 0) and,
+/// exactly, the bonded semiconductor gage of thesis Appendix B.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmLaw {
     offset: f64,
@@ -54,16 +53,16 @@ impl ArmLaw {
     /// A gage of constant gage factor, `δ = GF ε`.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// As for [`new`](Self::new).
     pub fn foil(gage_factor: f64) -> Result<Self, BridgeError> {
         Self::new(0.0, gage_factor, 0.0)
     }
 
-    /// A bonded gage at a temperature (K), with the fractional drift of its
-    /// unbonded resistance since bonding; relative to its bonded resistance.
+    /// A bonded gage at a temperature (K), with the fractional drift of its unbonded resistance
+    /// since bonding; relative to its bonded resistance.
     ///
     /// # Errors
-    /// [`BridgeError::Gage`] when the gage has no such state; as [`new`](Self::new).
+    /// [`BridgeError::Gage`] for an impossible state of the gage; as for [`new`](Self::new).
     pub fn from_gage(
         gage: &BondedGage,
         temperature_k: f64,
@@ -102,8 +101,8 @@ impl ArmLaw {
         self.linear + 2.0 * self.quadratic * strain
     }
 
-    /// Strains, within ±1, where the arm has resistance and the parabola has
-    /// not turned back; the voltage determines the strain there.
+    /// Range of strain, within ±1, with positive resistance and before the vertex of the parabola,
+    /// so that the voltage determines the strain.
     ///
     /// ```
     /// use torqcomp_dsp::bridge::ArmLaw;

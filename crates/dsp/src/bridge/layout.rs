@@ -1,4 +1,4 @@
-//! Which arms of the bridge carry gages, and how the wires reach them.
+//! Arrangement of the gages in the bridge, and their wiring.
 
 /// Arrangement of the active arms.
 ///
@@ -57,8 +57,8 @@ impl BridgeLayout {
         }
     }
 
-    /// Number of arms' worth of signal `n`: 1 for the quarter bridge, 2 for the
-    /// half, 1 + ν with a transverse gage, 4 for the full bridge.
+    /// Number of active arms `n`, weighted by strain: 1 for the quarter bridge, 2 for the half, 1 +
+    /// ν with a transverse gage, 4 for the full bridge.
     pub fn bridge_factor(&self) -> f64 {
         let signs = [1.0, -1.0, 1.0, -1.0];
         let arms = self.arm_factors();
@@ -86,41 +86,41 @@ impl BridgeLayout {
     }
 }
 
-/// What drives the bridge.
+/// Supply of the bridge.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Supply {
-    /// A source that holds its voltage E_s.
+    /// Constant voltage source E_s.
     ConstantVoltage {
         /// Source voltage, V; negative when the source is reversed.
         volts: f64,
     },
-    /// A source that holds its current I_s.
+    /// Constant current source I_s.
     ConstantCurrent {
         /// Source current, A; negative when the source is reversed.
         amperes: f64,
     },
 }
 
-/// Wires between the gages and the instrument; every wire has `lead_ohm`.
+/// Wires between the gages and the instrument, each with resistance `lead_ohm`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Leads {
     /// Wires without resistance.
     None,
-    /// Each gage on its own pair of wires, both in series with it: loses
-    /// signal and moves the zero.
+    /// A pair of wires for each gage, both in series with it: reduces the signal and shifts the
+    /// zero.
     TwoWire {
         /// Resistance of one wire, ohm.
         lead_ohm: f64,
     },
-    /// One wire in arm 1, one in arm 2, one in the output corner between them:
-    /// keeps the zero. For gages in arms 1 and 2 only.
+    /// One wire in arm 1, one in arm 2, one in the output corner between them: preserves the zero.
+    /// For gages in arms 1 and 2 only.
     ThreeWire {
         /// Resistance of one wire, ohm.
         lead_ohm: f64,
     },
-    /// The whole bridge at the part: two supply wires, two output wires.
+    /// Complete bridge at the part: two supply wires, two output wires.
     FourWire {
         /// Resistance of one wire, ohm.
         lead_ohm: f64,

@@ -31,8 +31,8 @@ pub(super) struct Network {
 type WithGradient = (f64, [f64; 4]);
 
 impl Network {
-    /// Output (V) and its derivative when the arms change by `change` from
-    /// their base and move on at `rate`.
+    /// Output (V) and its derivative when the arms change by `change` from their base at the rate
+    /// `rate`.
     pub fn output(&self, change: [f64; 4], rate: [f64; 4]) -> (f64, f64) {
         let r: [f64; 4] = std::array::from_fn(|i| self.base[i] + change[i]);
         let numerator = self.imbalance(change);
@@ -53,8 +53,7 @@ impl Network {
         self.transfer(r).0 / self.determinant(r).0 + self.output_lead
     }
 
-    /// `r₁r₃ - r₂r₄`, expanded about the base: near balance the plain form
-    /// would leave only rounding.
+    /// `r₁r₃ - r₂r₄`, expanded about the base to avoid cancellation near balance.
     fn imbalance(&self, c: [f64; 4]) -> f64 {
         let b = self.base;
         (b[0] * b[2] - b[1] * b[3])

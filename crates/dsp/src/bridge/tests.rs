@@ -62,7 +62,7 @@ fn eliminate(mut m: Vec<Vec<f64>>) -> Vec<f64> {
     x
 }
 
-/// Recorder voltage with every wire drawn as a branch of its own.
+/// Recorder voltage with every wire as a separate branch.
 ///
 /// Ring corners: 1 is 4-1, 2 is 1-2, 0 (ground) is 2-3, 3 is 3-4.
 fn kirchhoff(bridge: &Bridge, strain: f64) -> f64 {
@@ -157,7 +157,7 @@ prop_compose! {
     }
 }
 
-/// A strain of the bridge's range; `place` runs from 0 to 1.
+/// A strain within the range of the bridge; `place` runs from 0 to 1.
 fn strain_at(bridge: &Bridge, place: f64) -> f64 {
     let (low, high) = bridge.strain_range();
     low + place * (high - low)
@@ -196,7 +196,7 @@ proptest! {
         let step = 1e-4 * (strain - low).min(high - strain);
         let rise = kirchhoff(&bridge, strain + step) - kirchhoff(&bridge, strain - step);
         let slope = bridge.output_and_slope(strain).1;
-        // Differencing loses ten of sixteen digits where the output saturates.
+        // Numerical differentiation loses ten of sixteen digits where the output saturates.
         let tolerance = 1e-6 * slope.abs() + 1e-12 * scale_v(&bridge) / step;
         prop_assert!((slope - rise / (2.0 * step)).abs() < tolerance, "{slope}");
     }
@@ -246,7 +246,7 @@ proptest! {
         let law = ArmLaw::foil(gage_factor).unwrap();
         let supply = Supply::ConstantVoltage { volts: 22.5 };
         let quarter = Bridge::new(BridgeLayout::Quarter, law, 350.0, supply).unwrap();
-        // E δ / (2 (2 + δ)) of the textbook.
+        // The textbook formula E δ / (2 (2 + δ)).
         let change = gage_factor * strain;
         let closed = 22.5 * change / (2.0 * (2.0 + change));
         let exact = quarter.output_v(strain).unwrap();
@@ -334,7 +334,7 @@ fn ranges_end_at_the_vertex_or_at_no_resistance() {
     // Half of the arm and half the coefficients: the same root.
     let (low, _) = ArmLaw::new(-0.5, 50.0, 1200.0).unwrap().strain_range();
     assert!((low + 1.0 / 60.0).abs() < 1e-16);
-    // Vertex at -100/20000 with 3/4 of the resistance left; N-type mirrors it.
+    // Vertex at -100/20000 with 3/4 of the resistance left; N-type is mirrored.
     assert_eq!(
         ArmLaw::new(0.0, 100.0, 10000.0).unwrap().strain_range(),
         (-0.005, 1.0)
@@ -397,7 +397,7 @@ fn the_ends_of_the_range_convert_back() {
         let (low, high) = bridge.strain_range();
         for end in [low, high] {
             let back = bridge.strain(bridge.output_v(end).unwrap()).unwrap();
-            // The slope is small at the far end, so a rounding of the volts weighs more.
+            // The slope is small at the far end, which amplifies rounding errors of the voltage.
             assert!(
                 (back - end).abs() < 1e-9 * end.abs(),
                 "{layout:?} {end} {back}"
@@ -406,8 +406,8 @@ fn the_ends_of_the_range_convert_back() {
     }
 }
 
-/// The full bridge of silicon saturates at both ends, where a rounding of the
-/// output outweighs one of the strain and the iteration must know to stop.
+/// A full semiconductor bridge saturates at both ends, where a rounding of the output outweighs one
+/// of the strain and the iteration must still terminate.
 #[test]
 fn a_saturating_bridge_converts_back_over_its_whole_range() {
     let law = ArmLaw::new(-0.0022, 141.9, 2062.8).unwrap();

@@ -8,12 +8,12 @@ use torqcomp_fourier::{ComplexToReal, RealToComplex};
 use super::InverseFilter;
 use crate::spectrum::PowerSum;
 
-/// Shortest block: shorter ones spend their time outside the transform.
+/// Shortest block: for shorter ones the overhead outside the transform dominates.
 const SHORTEST_BLOCK: usize = 1 << 12;
-/// Longest block that is considered for its speed; a longer filter still gets a longer block.
+/// Longest block chosen for speed; a longer filter still gets a longer block.
 const LONGEST_BLOCK: usize = 1 << 17;
 
-/// Overlap-save convolution, one per thread.
+/// Overlap-save convolution for use in one thread.
 ///
 /// A window of `n + 2P` samples gives `n` results, `P` being the filter's half-length.
 pub struct BlockConvolver {
@@ -69,7 +69,7 @@ impl BlockConvolver {
         }
     }
 
-    /// Another convolver for the same filter, for another thread.
+    /// Another convolver for the same filter, for use in another thread.
     #[must_use]
     pub fn another(&self) -> Self {
         Self {
@@ -89,7 +89,7 @@ impl BlockConvolver {
         self.block.len()
     }
 
-    /// Results that one transform gives.
+    /// Number of results per transform.
     #[must_use]
     pub fn step(&self) -> usize {
         self.block.len() - 2 * self.half_length
@@ -97,11 +97,11 @@ impl BlockConvolver {
 
     /// Convolves a window; `out` gets `window.len() - 2P` results.
     ///
-    /// With `power`, the power spectrum of every block that lies wholly inside the window is added
-    /// to it: the forward transforms are there anyway.
+    /// Adds the power spectrum of every block entirely inside the window to `power`, if given: the
+    /// forward transforms are computed anyway.
     ///
     /// # Panics
-    /// If `out` has another length than `window.len() - 2P`.
+    /// If the length of `out` is not `window.len() - 2P`.
     pub fn convolve(&mut self, window: &[f64], out: &mut [f64], mut power: Option<&mut PowerSum>) {
         assert_eq!(
             out.len() + 2 * self.half_length,
@@ -125,7 +125,7 @@ impl BlockConvolver {
             for (bin, gain) in self.spectrum.iter_mut().zip(self.kernel.iter()) {
                 *bin *= gain;
             }
-            // Both factors are real at these two bins; rounding must not say otherwise.
+            // Both factors are real at these two bins; remove rounding errors.
             self.spectrum[0].im = 0.0;
             self.spectrum[length / 2].im = 0.0;
             self.backward
@@ -137,8 +137,8 @@ impl BlockConvolver {
     }
 }
 
-/// Block length with the least work per result, at most 5 % from the least at a shorter block
-/// (which stays in cache).
+/// Block length with the least work per result, or a shorter one (which stays in cache) within 5 %
+/// of that.
 fn block_length(taps: usize) -> usize {
     let shortest = (2 * taps).next_power_of_two().max(SHORTEST_BLOCK);
     let work = |n: usize| n as f64 * (n as f64).log2() / (n - taps + 1) as f64;

@@ -1,4 +1,4 @@
-//! A record and its continuation, taken to the frequency domain and back as a whole.
+//! Transform of a whole record with its extension, to the frequency domain and back.
 
 use std::sync::Arc;
 
@@ -8,10 +8,10 @@ use torqcomp_fourier::{ComplexToReal, RealToComplex};
 use super::continued;
 use super::whole::fast_length;
 
-/// Transforms of records of one length, each continued beyond both ends by point reflection that fades
-/// out over the outer half of the continuation.
+/// Transforms for records of one length, each extended beyond both ends by point reflection that fades
+/// out over the outer half of the extension.
 ///
-/// The mean goes its own way: it stays a constant, whatever the continuation.
+/// The mean is handled separately: it remains constant, whatever the extension.
 #[derive(Clone)]
 pub struct Extension {
     count: usize,
@@ -22,7 +22,7 @@ pub struct Extension {
     backward: Arc<dyn ComplexToReal<f64>>,
 }
 
-/// Spectrum of a record: its mean, and the lines of what is left.
+/// Spectrum of a record: its mean, and the lines of the remainder.
 #[derive(Debug, Clone)]
 pub struct Spectrum {
     mean: f64,
@@ -30,7 +30,7 @@ pub struct Spectrum {
 }
 
 impl Extension {
-    /// Plans the transforms of records of that many samples, continued by `lead` samples at both ends.
+    /// Plans the transforms for records of `count` samples, extended by `lead` samples at both ends.
     #[must_use]
     pub fn new(count: usize, rate_hz: f64, lead: usize) -> Self {
         let total = fast_length(count + 2 * lead);
@@ -47,7 +47,7 @@ impl Extension {
     /// Spectrum of a record.
     ///
     /// # Panics
-    /// If the record is not as long as planned.
+    /// If the length of the record is not the planned one.
     #[must_use]
     pub fn spectrum(&self, samples: &[f64]) -> Spectrum {
         assert_eq!(samples.len(), self.count, "planned for another length");
@@ -69,11 +69,11 @@ impl Extension {
         Spectrum { mean, lines }
     }
 
-    /// The record of a spectrum.
+    /// The record with this spectrum.
     #[must_use]
     pub fn samples(&self, spectrum: &Spectrum) -> Vec<f64> {
         let mut lines = spectrum.lines.clone();
-        // A real record has real lines at zero and at half the rate.
+        // The DC and Nyquist lines of a real record are real.
         lines[0].im = 0.0;
         if self.total.is_multiple_of(2)
             && let Some(last) = lines.last_mut()
@@ -92,7 +92,7 @@ impl Extension {
         padded
     }
 
-    /// Multiplies every line of a spectrum by a response; a mean where the response is not finite is lost.
+    /// Multiplies a spectrum by a response; a mean at which the response is not finite is lost.
     #[must_use]
     pub fn times(&self, mut spectrum: Spectrum, response: impl Fn(f64) -> Complex64) -> Spectrum {
         let step_hz = self.rate_hz / self.total as f64;
@@ -113,7 +113,7 @@ impl Extension {
         spectrum
     }
 
-    /// A record through a response.
+    /// Passes a record through a response.
     ///
     /// ```
     /// use num_complex::Complex64;
@@ -143,7 +143,7 @@ impl std::ops::Add for Spectrum {
     }
 }
 
-/// 1 over the inner half of a continuation, from there down to 0 as a cosine.
+/// 1 over the inner half of an extension, then a cosine fade to 0.
 fn fade(k: usize, lead: usize) -> f64 {
     let part = (2.0 * k as f64 / (lead + 1) as f64 - 1.0).max(0.0);
     0.5 + 0.5 * (std::f64::consts::PI * part).cos()

@@ -1,14 +1,14 @@
-//! A band-limited signal between its samples, window by window.
+//! Interpolation of a band-limited signal between its samples, window by window.
 
 use std::sync::Arc;
 
 use num_complex::Complex64;
 use torqcomp_fourier::{ComplexToReal, RealToComplex};
 
-/// Goes between a window of samples and the same window at a rate that is a whole number of times higher.
+/// Converts between a window of samples and the same window at an integer multiple of the rate.
 ///
-/// A window is faded in and out over a quarter of its margins at either side: what comes out there is
-/// not to be used.
+/// A window is faded in and out over a quarter of its margin at either side; the results there are
+/// invalid.
 pub struct Fine {
     length: usize,
     factor: usize,
@@ -33,7 +33,7 @@ impl Pair {
 }
 
 impl Fine {
-    /// Windows of `length` samples with `margin` of them at both sides to spare, refined `factor` times.
+    /// Windows of `length` samples, including a `margin` at either side, upsampled `factor` times.
     #[must_use]
     pub fn new(length: usize, margin: usize, factor: usize, rate_hz: f64) -> Self {
         Self {
@@ -46,7 +46,7 @@ impl Fine {
         }
     }
 
-    /// Lines of a window of samples, scaled so that [`Fine::refined`] gives them back.
+    /// Spectrum of a window of samples, scaled for [`Fine::refined`].
     #[must_use]
     pub fn spectrum(&self, window: &[f64]) -> Vec<Complex64> {
         let mut faded = self.faded(window, self.margin);
@@ -60,7 +60,7 @@ impl Fine {
         lines
     }
 
-    /// Lines, up to half the rate of the samples, of a window at the higher rate.
+    /// Spectrum of a window at the higher rate, up to the Nyquist frequency of the lower rate.
     #[must_use]
     pub fn spectrum_of_fine(&self, window: &[f64]) -> Vec<Complex64> {
         let mut faded = self.faded(window, self.margin * self.factor);
@@ -75,7 +75,8 @@ impl Fine {
         lines
     }
 
-    /// The window at the higher rate, each line through a response of the frequency in Hz.
+    /// The window at the higher rate, passed through a response, which is a function of frequency
+    /// in Hz.
     #[must_use]
     pub fn refined(&self, lines: &[Complex64], response: impl Fn(f64) -> Complex64) -> Vec<f64> {
         let mut padded = self.fine.backward.make_input_vec();
@@ -84,13 +85,13 @@ impl Fine {
             *to = line * response(k as f64 * step_hz);
         }
         if self.factor > 1 {
-            // The line at half the sampling rate stands for both signs of frequency.
+            // The Nyquist line represents both signs of frequency.
             padded[self.length / 2] *= 0.5;
         }
         back(self.fine.backward.as_ref(), padded)
     }
 
-    /// The window at the rate of the samples.
+    /// The window at the lower rate.
     #[must_use]
     pub fn samples(&self, lines: &[Complex64]) -> Vec<f64> {
         back(self.coarse.backward.as_ref(), lines.to_vec())

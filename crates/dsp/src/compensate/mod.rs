@@ -1,4 +1,4 @@
-//! Dividing the stand's response out of a record, up to a stated band.
+//! Inversion of the stand's response in a record, up to a stated band.
 //!
 //! With the inverse response `H⁻¹(f)` (torque over recorded torque) and the band `W(f)`, the
 //! compensated spectrum is
@@ -7,17 +7,16 @@
 //! T(f) = W(f) H⁻¹(f) T_o(f)                         (thesis, eq. 32, at every frequency)
 //! ```
 //!
-//! There are two ways to run it, which give the same answer:
+//! Two implementations give the same result:
 //!
 //! * [`whole_record`]: one transform over the record, each of its frequencies multiplied by the
 //!   exact `W H⁻¹`.
-//! * [`Stream`]: overlap-save with the impulse response of `W H⁻¹`, cut where it has died out, in
-//!   memory that does not grow with the record.
+//! * [`Stream`]: overlap-save with the impulse response of `W H⁻¹`, truncated where it has decayed,
+//!   in memory that does not grow with the record.
 //!
-//! Beyond both ends the record is continued by point reflection about its end sample
-//! (`2x₀ − x[k]`), so that nothing wraps round from one end to the other, a constant stays a
-//! constant, and a slope goes on as a slope. Within [`InverseFilter::half_length`] samples of an
-//! end the result leans on that continuation.
+//! Beyond both ends the record is extended by point reflection about its end sample (`2x₀ − x[k]`),
+//! which prevents wrap-around and preserves constants and slopes. Within
+//! [`InverseFilter::half_length`] samples of an end the result depends on that extension.
 
 mod blocks;
 mod extension;
@@ -39,11 +38,11 @@ pub use fine::Fine;
 pub use whole::whole_record;
 pub use windows::{Stream, Windows};
 
-/// Part of the impulse response that may be cut off, relative to the static gain. It bounds the
-/// difference between the two ways to run a compensation, relative to the recorded full scale.
+/// Part of the impulse response that may be truncated, relative to the static gain. It bounds the
+/// difference between the two implementations, relative to the recorded full scale.
 const TAIL_TOLERANCE: f64 = 2e-10;
-/// The same relative to the largest gain: where a compensation multiplies by thousands, what is cut
-/// off is nothing beside what noise becomes.
+/// The same relative to the largest gain: where a compensation amplifies a thousandfold, truncation
+/// is negligible compared with the amplified noise.
 const TAIL_OF_LARGEST: f64 = 4e-12;
 /// Longest transform used to build a filter.
 const LONGEST_DESIGN: usize = 1 << 24;
@@ -74,13 +73,14 @@ impl InverseFilter {
     /// Builds the filter for an inverse response and a band.
     ///
     /// The impulse response is the inverse transform of `W(f) H⁻¹(f)` on a grid that is refined
-    /// until the response dies out well inside it. It is cut where less than 2·10⁻¹⁰ of the static
-    /// gain is left (sum of magnitudes), and scaled so that its sum is the static gain exactly.
+    /// until the response decays well inside it. It is truncated where less than 2·10⁻¹⁰ of the
+    /// static gain remains (sum of magnitudes), and normalised so that its sum is exactly the
+    /// static gain.
     ///
     /// # Errors
     /// [`Error::InverseNotFinite`] if the inverse is infinite inside the band,
     /// [`Error::NotPositive`] if its static value is not a positive number,
-    /// [`Error::FilterTooLong`] if it does not die out within 2²² samples.
+    /// [`Error::FilterTooLong`] if it does not decay within 2²² samples.
     ///
     /// ```
     /// use std::sync::Arc;
@@ -102,7 +102,8 @@ impl InverseFilter {
             });
         }
         let edge_width = band.end_hz() - band.top_hz();
-        // Some hundred points over the edge are where the response can start to die out.
+        // A response resolved by some hundred points over the edge is the shortest that can have
+        // decayed.
         let longest = 2.0 * LONGEST_DESIGN as f64;
         let start = (64.0 * band.sample_rate_hz() / edge_width).clamp(1024.0, longest) as usize;
         let mut length = start.next_power_of_two();
@@ -140,13 +141,13 @@ impl InverseFilter {
         &self.taps
     }
 
-    /// Samples before and after a sample that its result depends on.
+    /// Number of samples before and after a sample that affect its result.
     #[must_use]
     pub fn half_length(&self) -> usize {
         self.half_length
     }
 
-    /// The inverse response, whatever the band.
+    /// The inverse response without the band.
     #[must_use]
     pub fn inverse(&self) -> &Inverse {
         &self.inverse
@@ -167,7 +168,7 @@ impl InverseFilter {
 
 fn response(inverse: &Inverse, band: &Band, frequency_hz: f64) -> Complex64 {
     let gain = band.gain(frequency_hz);
-    // Above the band the inverse may be infinite; it is not asked.
+    // Above the band the inverse may be infinite, so it is not evaluated.
     if gain == 0.0 {
         Complex64::ZERO
     } else {
@@ -191,7 +192,7 @@ fn response_on_grid(
         }
         grid.push(value);
     }
-    // A real signal has real values at zero and at half the rate.
+    // The DC and Nyquist values of a real signal are real.
     grid[0].im = 0.0;
     if length.is_multiple_of(2) {
         grid[length / 2].im = 0.0;
@@ -199,7 +200,7 @@ fn response_on_grid(
     Ok(grid)
 }
 
-/// Impulse response on a circle of `length` samples, time zero at index 0.
+/// Circular impulse response of `length` samples, time zero at index 0.
 fn impulse_response(mut spectrum: Vec<Complex64>, length: usize) -> Vec<f64> {
     let mut response = vec![0.0; length];
     torqcomp_fourier::inverse(length)
@@ -210,8 +211,8 @@ fn impulse_response(mut spectrum: Vec<Complex64>, length: usize) -> Vec<f64> {
     response
 }
 
-/// Half-length beyond which at most `tolerance` is left on the circle; `None` if that is not
-/// within a quarter of the circle, where the two ends would start to run into each other.
+/// Half-length beyond which at most `tolerance` remains; `None` if it exceeds a quarter of the
+/// circle, where the two ends would start to overlap.
 fn half_length(circular: &[f64], tolerance: f64) -> Option<usize> {
     let length = circular.len();
     let mut left = 0.0;
@@ -224,8 +225,8 @@ fn half_length(circular: &[f64], tolerance: f64) -> Option<usize> {
     Some(0)
 }
 
-/// Sample `index` of a record that is continued by point reflection about its end samples, and
-/// held constant where the record is too short for that.
+/// Sample `index` of a record extended by point reflection about its end samples, and held constant
+/// where the record is too short for that.
 ///
 /// ```
 /// use torqcomp_dsp::compensate::continued;
@@ -235,7 +236,7 @@ fn half_length(circular: &[f64], tolerance: f64) -> Option<usize> {
 /// ```
 ///
 /// # Panics
-/// If the record has no sample.
+/// If the record is empty.
 #[must_use]
 pub fn continued(samples: &[f64], index: isize) -> f64 {
     let last = samples.len() - 1;

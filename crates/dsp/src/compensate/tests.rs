@@ -122,7 +122,7 @@ fn stream_and_whole_record_agree_on_broadband_data() {
         for piece in [1, 77, 4096, 50_000] {
             let streamed = stream(&filter, &record, piece);
             let difference = largest_difference(&streamed, &whole);
-            // At the ends, too: both continue the record in the same way.
+            // At the ends, too, as both extend the record in the same way.
             assert!(
                 difference < 1e-9 * full_scale,
                 "{rate} {band} {piece}: {difference:e}"
@@ -182,7 +182,7 @@ fn constants_are_kept_to_the_last_sample() {
 
 #[test]
 fn one_end_does_not_reach_the_other() {
-    // Quiet at the start, ringing hard at the end.
+    // Quiet at the start, ringing at the end.
     let filter = hertel(20_000.0, 2400.0);
     let record: Vec<f64> = (0..6000)
         .map(|i| {
@@ -204,7 +204,8 @@ fn one_end_does_not_reach_the_other() {
 
 #[test]
 fn taps_are_the_integral_of_the_response() {
-    // The impulse response by direct summation of its Fourier integral: an independent, slow way.
+    // The impulse response by direct summation of its Fourier integral, a slow but independent
+    // method.
     let filter = hertel(20_000.0, 2400.0);
     let fine = 400_000;
     for lag in [0_usize, 1, 5, 40, 200] {
@@ -234,7 +235,7 @@ fn impossible_inverses_are_refused() {
         InverseFilter::design(Arc::new(|_| Complex64::new(-1.0, 0.0)), band()),
         Err(Error::NotPositive { .. })
     ));
-    // An inverse with an undamped pole never dies out.
+    // An inverse with an undamped pole does not decay.
     let rings = |f: f64| Complex64::new(1.0 / (1.0 - (f / 1000.1).powi(2)), 0.0);
     assert!(matches!(
         InverseFilter::design(Arc::new(rings), Band::new(5000.0, 2400.0).unwrap()),

@@ -1,4 +1,4 @@
-//! Compensation of a record as a whole, with one transform.
+//! Compensation of a whole record with one transform.
 
 use super::{InverseFilter, continued, response_on_grid};
 use crate::Error;
@@ -6,8 +6,7 @@ use crate::Error;
 /// Compensates a record with one transform over all of it.
 ///
 /// Every frequency of the transform is multiplied by the exact `W(f) H⁻¹(f)`; the record's
-/// continuation beyond its ends keeps one end from reaching the other. Takes about 40 bytes of
-/// memory a sample.
+/// extension keeps its ends from affecting each other. Takes about 40 bytes of memory per sample.
 ///
 /// # Errors
 /// [`Error::TooShort`] for fewer than 2 samples, [`Error::NonFinite`] for a sample that is not a
@@ -43,7 +42,7 @@ pub fn whole_record(filter: &InverseFilter, samples: &[f64]) -> Result<Vec<f64>,
     }
     let margin = filter.half_length();
     let length = fast_length(samples.len() + 2 * margin);
-    // The continuation after the end meets the one before the start somewhere in the padding.
+    // The extensions of the two ends meet in the padding.
     let after = margin + (length - samples.len() - 2 * margin) / 2;
     let mut padded: Vec<f64> = (0..length)
         .map(|i| {

@@ -1,19 +1,19 @@
-//! Cutting an endless record into windows that can be compensated one by one.
+//! Splitting a stream into windows for compensation one by one.
 
 use std::collections::VecDeque;
 
 use super::{BlockConvolver, InverseFilter, continued};
 use crate::Error;
 
-/// Cuts a stream of segments into windows: each segment with `half_length` samples before and
-/// after it, taken from its neighbours, or from the record's continuation at its two ends.
+/// Splits a stream of segments into windows: each segment with `half_length` samples before and
+/// after it, from its neighbours, or from the record's extension at its two ends.
 ///
-/// Memory: the segments that still wait for the samples after them.
+/// Memory: the segments waiting for the samples after them.
 #[derive(Debug)]
 pub struct Windows {
     half_length: usize,
     /// `half_length` samples before the oldest waiting segment (once started), then the waiting
-    /// segments themselves.
+    /// segments.
     buffer: Vec<f64>,
     /// Lengths of the waiting segments, oldest first.
     waiting: VecDeque<usize>,
@@ -23,7 +23,7 @@ pub struct Windows {
 }
 
 impl Windows {
-    /// Windows for a filter of that half-length.
+    /// Windows for a filter of this half-length.
     #[must_use]
     pub fn new(half_length: usize) -> Self {
         Self {
@@ -41,14 +41,14 @@ impl Windows {
         self.passed
     }
 
-    /// Takes the next segment of the record. Segments may have any length, also none.
+    /// Takes the next segment of the record, of any length, including zero.
     pub fn push(&mut self, segment: &[f64]) {
         self.buffer.extend_from_slice(segment);
         self.waiting.push_back(segment.len());
     }
 
-    /// Window of the oldest waiting segment, once enough samples follow it. `window` is cleared
-    /// and filled; `true` if there was one.
+    /// Moves the window of the oldest waiting segment into `window` and returns `true`, if enough
+    /// samples follow that segment.
     pub fn pop(&mut self, window: &mut Vec<f64>) -> bool {
         let Some(&length) = self.waiting.front() else {
             return false;
@@ -65,8 +65,8 @@ impl Windows {
         true
     }
 
-    /// Tells that no more segments follow: the record is continued so that [`Windows::pop`] gives
-    /// all that is left.
+    /// Marks the end of the record: it is extended so that [`Windows::pop`] returns the remaining
+    /// windows.
     pub fn finish(&mut self) {
         if self.buffer.is_empty() {
             return;
@@ -80,7 +80,7 @@ impl Windows {
         self.buffer.extend(reflected);
     }
 
-    /// Puts the continuation before the first sample.
+    /// Prepends the extension before the first sample.
     fn start(&mut self) {
         if self.started {
             return;
@@ -127,7 +127,7 @@ impl Windows {
 pub struct Stream {
     windows: Windows,
     convolver: BlockConvolver,
-    /// Samples that do not fill a block yet.
+    /// Samples that do not yet fill a block.
     held: Vec<f64>,
     window: Vec<f64>,
     taken: usize,
@@ -146,11 +146,11 @@ impl Stream {
         }
     }
 
-    /// Takes the next samples and appends to `out` what is finished by them.
+    /// Takes the next samples and appends the results that they complete to `out`.
     ///
     /// # Errors
     /// [`Error::NonFinite`] for a sample that is not a number, counted from the record's start;
-    /// nothing of this piece is taken then.
+    /// none of this piece is then taken.
     pub fn push(&mut self, samples: &[f64], out: &mut Vec<f64>) -> Result<(), Error> {
         if let Some(index) = samples.iter().position(|x| !x.is_finite()) {
             return Err(Error::NonFinite {

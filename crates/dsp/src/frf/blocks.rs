@@ -1,18 +1,18 @@
-//! Cutting records into blocks, and their spectra.
+//! Splitting records into blocks, and their spectra.
 
 use num_complex::Complex64;
 
 use super::Block;
 
-/// Weight of the samples of a block.
+/// Window applied to a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Window {
-    /// None: whole periods, or transients that die out.
+    /// None: whole periods, or transients that decay within the block.
     None,
     /// Hann window, for noise.
     Hann,
-    /// e^{−i/τ} over samples i, on both signals, for transients that do not die out. It adds exactly 1/τ to every
-    /// decay rate.
+    /// e^{−i/τ} over samples i, on both signals, for transients that do not decay within the block. It adds
+    /// exactly 1/τ to every decay rate.
     Exponential(f64),
 }
 
@@ -24,16 +24,16 @@ pub fn transform(applied: &[f64], measured: &[f64], window: Window) -> Block {
     Block { applied, measured }
 }
 
-/// Spectrum of a signal at a range of lines; the others are not kept.
+/// Spectrum of a signal at a range of lines only.
 #[must_use]
 pub fn lines_of(samples: &[f64], lines: std::ops::Range<usize>) -> Vec<Complex64> {
     Transform::new(samples.len(), Window::None).spectrum(samples)[lines].to_vec()
 }
 
-/// Fewest samples for which both channels are processed in parallel.
+/// Minimum number of samples for processing both channels in parallel.
 const WORTH_A_THREAD: usize = 1 << 17;
 
-/// The same function of both channels.
+/// Applies a function to both channels.
 fn of_both<T: Send>(
     applied: &[f64],
     measured: &[f64],
@@ -92,7 +92,7 @@ impl Transform {
     }
 }
 
-/// Half-overlapping Hann-weighted segments of that length.
+/// Hann-weighted segments of this length with 50 % overlap.
 #[must_use]
 pub fn segments(applied: &[f64], measured: &[f64], length: usize) -> Vec<Block> {
     let count = applied.len().min(measured.len());
@@ -115,17 +115,17 @@ pub fn segments(applied: &[f64], measured: &[f64], length: usize) -> Vec<Block> 
 pub struct Periodic {
     /// Mean spectrum of a period.
     pub mean: Block,
-    /// Power of the noise in the measured mean at each line: the variance between periods over their number.
+    /// Noise power of the measured mean at each line: the variance between periods over their number.
     pub noise_power: Vec<f64>,
     /// Lines that the applied signal excites.
     pub excited: Vec<bool>,
 }
 
-/// Amplitude of an excited line, over that of the strongest.
+/// Minimum amplitude of an excited line, relative to the strongest.
 const EXCITED: f64 = 1e-2;
 
-/// Averages whole periods (J. Schoukens, R. Pintelon, Y. Rolain, Mastering System Identification in 100
-/// Exercises, 2012, 5.2): differences between periods are noise, power of the mean at lines that are not excited is
+/// Averages whole periods (J. Schoukens, R. Pintelon, Y. Rolain, Mastering System Identification in 100 Exercises,
+/// 2012, 5.2): differences between periods are noise, power of the mean at lines that are not excited is
 /// distortion. `None` for fewer than two blocks.
 #[must_use]
 pub fn average_periods(periods: &[Block]) -> Option<Periodic> {
@@ -165,10 +165,10 @@ pub fn average_periods(periods: &[Block]) -> Option<Periodic> {
     })
 }
 
-/// Smallest autocorrelation at the lag of a period.
+/// Minimum autocorrelation at the lag of a period.
 const ALIKE: f64 = 0.98;
 
-/// The period of a signal in samples, if the signal has at least two of them.
+/// Period of a signal in samples; `None` for fewer than two periods.
 #[must_use]
 pub fn find_period(samples: &[f64]) -> Option<usize> {
     let count = samples.len();

@@ -14,9 +14,9 @@ pub struct Hit {
     pub range: Range<usize>,
     /// Sample with the largest force.
     pub peak: usize,
-    /// Why it should not be used.
+    /// Reasons not to use it.
     pub faults: Vec<HitFault>,
-    /// Force of a second stroke over that of the first, if there is one.
+    /// Force of a double hit's second stroke relative to the first, if any.
     pub second: Option<f64>,
 }
 
@@ -27,7 +27,7 @@ pub enum HitFault {
     ForceClipped,
     /// The measured signal is clipped.
     MeasuredClipped,
-    /// The record ends soon after it.
+    /// The record ends soon after the hit.
     CutShort,
 }
 
@@ -41,28 +41,29 @@ impl fmt::Display for HitFault {
     }
 }
 
-/// Smallest force of a hit over the largest one; weaker pulses belong to the hit before.
+/// Smallest force of a hit relative to the largest; weaker pulses belong to the preceding hit.
 const STRONG: f64 = 0.3;
-/// Smallest force of a second stroke, over the first, that is reported. It is part of the recorded force.
+/// Smallest force of a second stroke, relative to the first, that is reported. It is part of the recorded
+/// force.
 const SECOND: f64 = 0.05;
 /// Smallest force of a second stroke, in standard deviations of the force at rest.
 const ABOVE_NOISE: f64 = 8.0;
-/// Distance from its extreme, over it, within which a signal counts as clipped.
+/// Relative distance from the extreme value within which a sample counts as clipped.
 const LEVEL: f64 = 0.01;
-/// The same in standard deviations of the noise, and its largest value: noise on a limit spreads over so much.
+/// The same in standard deviations of the noise, and its upper limit: noise spreads a limit this far.
 const NOISE: (f64, f64) = (6.0, 0.06);
-/// Consecutive samples at the extreme over those beyond half of it: 0.13 for half a sine and 0.12 for a bell; more means
-/// that an amplifier saturated.
+/// Consecutive samples at the extreme, relative to those beyond half of it: 0.13 for a half-sine and 0.12 for a bell;
+/// more means that an amplifier saturated.
 const STANDING: f64 = 0.3;
-/// The same over what half a sine has.
+/// The same, relative to that of a half-sine.
 const LONGER: f64 = 1.5;
-/// Smallest extreme on the other side, over the largest, that can be a limit.
+/// Smallest extreme of the opposite sign, relative to the largest, that can be a limit.
 const OTHER_SIDE: f64 = 0.1;
-/// Fewest such samples.
+/// Minimum number of such samples.
 const LEAST_STANDING: usize = 4;
-/// Equal consecutive samples that mean clipping.
+/// Number of equal consecutive samples that means clipping.
 const FLAT: usize = 3;
-/// Samples kept before the force rises.
+/// Samples kept before the rise of the force.
 const BEFORE: usize = 16;
 
 /// Finds the hits. A second stroke within `apart` samples belongs to the first hit; later ones are separate hits.
@@ -79,7 +80,7 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
     let mut starts: Vec<usize> = Vec::new();
     for peak in all {
         let start = start_of(&size, peak, largest);
-        // A response that still rings belongs to the hit before.
+        // A response that is still ringing belongs to the preceding hit.
         if starts
             .last()
             .is_none_or(|last| has_decayed(&measured[*last..start]))
@@ -111,7 +112,8 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
         .collect()
 }
 
-/// Sample with the largest force of each pulse, except pulses within `apart` samples of the one before.
+/// Sample with the largest force of each pulse, except pulses within `apart` samples of the preceding
+/// one.
 fn peaks(size: &dyn Fn(usize) -> f64, count: usize, largest: f64, apart: usize) -> Vec<usize> {
     let mut peaks: Vec<usize> = Vec::new();
     let mut i = 0;
@@ -136,10 +138,11 @@ fn peaks(size: &dyn Fn(usize) -> f64, count: usize, largest: f64, apart: usize) 
     peaks
 }
 
-/// Swing at the end of a response over its largest below which the next hit has a response of its own.
+/// Final amplitude of a response, relative to its largest, below which the next hit has a response of
+/// its own.
 const DECAYED: f64 = 0.1;
 
-/// Whether a response has decayed at its end, the last fifth.
+/// Whether a response has decayed in its last fifth.
 fn has_decayed(measured: &[f64]) -> bool {
     let middle = median(measured);
     let size = |v: &f64| (v - middle).abs();
@@ -168,7 +171,7 @@ fn faults(
     faults
 }
 
-/// Start of the pulse with that peak.
+/// Start of the pulse with this peak.
 fn start_of(size: &impl Fn(usize) -> f64, peak: usize, largest: f64) -> usize {
     let quiet = (0..peak)
         .rev()
@@ -193,9 +196,9 @@ fn flat(samples: &[f64], rest: f64) -> bool {
         })
 }
 
-/// Whether a signal stays near its largest or smallest value longer than a pulse or a swing does: an amplifier that
-/// saturates before the converter has noise on its limit. Of each swing beyond half of the extreme, the samples near the
-/// extreme are counted; of half a sine, `arccos(1 − w)/(π/3)` lie within the part w of its peak.
+/// Whether a signal stays near its largest or smallest value longer than a pulse or oscillation does: with an amplifier
+/// that saturates before the converter, the limit is noisy. In each half cycle beyond half of the extreme, the samples
+/// near the extreme are counted; for a half-sine, the fraction `arccos(1 − w)/(π/3)` lies within `w` of its peak.
 fn stands(samples: &[f64], rest: f64, noise: f64) -> bool {
     let extreme = |side: f64| {
         samples
@@ -206,7 +209,7 @@ fn stands(samples: &[f64], rest: f64, noise: f64) -> bool {
     let extremes = [1.0, -1.0].map(extreme);
     let largest = extremes[0].max(extremes[1]);
     let sides = [1.0, -1.0].into_iter().zip(extremes);
-    // Behind a capacitor, a pulse is followed by a low and long swing to the other side.
+    // With AC coupling, a pulse is followed by a low and long swing of the opposite sign.
     let mut limits = sides.filter(|(_, extreme)| *extreme > OTHER_SIDE * largest);
     limits.any(|(side, extreme)| {
         let size = |v: &f64| side * (v - rest);
@@ -223,17 +226,17 @@ fn stands(samples: &[f64], rest: f64, noise: f64) -> bool {
     })
 }
 
-/// Standard deviation of the noise in a signal that is slow beside it most of the time: of its second differences.
+/// Standard deviation of the noise in a mostly slow signal, from its second differences.
 fn noise_of(samples: &[f64]) -> f64 {
     let second = samples.windows(3).map(|w| w[0] - 2.0 * w[1] + w[2]);
     spread(&second.collect::<Vec<f64>>(), 0.0) / 6.0_f64.sqrt()
 }
 
-/// Lines between 0.4 and 0.5 of the rate that are looked at.
+/// Number of lines evaluated between 0.4 and 0.5 of the rate.
 const LINES: usize = 16;
 
-/// Largest size of the spectrum of the pulse that a hit begins with, between 0.4 and 0.5 of the rate, over that at rest and
-/// beyond what its noise explains. A pulse that has been sampled fast enough has none left there.
+/// Largest spectral magnitude of the initial pulse of a hit between 0.4 and 0.5 of the rate, relative to DC and beyond
+/// what its noise explains. It vanishes for a pulse sampled fast enough.
 ///
 /// ```
 /// use torqcomp_dsp::frf::near_half_rate;
@@ -261,14 +264,14 @@ pub fn near_half_rate(force: &[f64]) -> f64 {
     };
     let lines = (0..=LINES).map(|k| 0.4 + 0.1 * k as f64 / LINES as f64);
     let largest = lines.map(at).fold(0.0, f64::max);
-    // The largest of many lines of noise is about twice its rms.
+    // The largest of many lines of noise is about twice their RMS.
     let noise = 2.5 * noise_of(force) * (pulse.len() as f64).sqrt();
     ((largest - noise) / at(0.0)).max(0.0)
 }
 
-/// Part by which white noise of the force makes the response too small at low frequencies, where it is not taken off:
-/// `N σ²/(N σ² + S²)` for `N` samples of the standard deviation `σ`, that of their second differences, and the sum `S` of the
-/// samples of the stroke (D. J. Ewins, *Modal Testing*, 2nd ed., 2000, 3.10).
+/// Relative bias of the response towards zero at low frequencies due to white noise of the force, where it is not
+/// corrected: `N σ²/(N σ² + S²)` for `N` samples of standard deviation `σ`, estimated from their second differences,
+/// and the sum `S` of the samples of the stroke (D. J. Ewins, *Modal Testing*, 2nd ed., 2000, 3.10).
 ///
 /// ```
 /// use torqcomp_dsp::frf::noise_share;
@@ -295,29 +298,31 @@ pub fn noise_share(force: &[f64]) -> f64 {
     of_noise / (of_noise + sum * sum)
 }
 
-/// Where the force of a hit is, and what it is beside it.
+/// Force pulse of a hit and the level of the force signal otherwise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stroke {
     /// Its samples.
     pub range: Range<usize>,
-    /// Mean behind them.
+    /// Mean after them.
     pub rest: f64,
 }
 
-/// Distance from the middle, in standard deviations of the noise, from which a sample is force.
+/// Threshold of the force above the baseline, in standard deviations of the noise.
 const LOUD: f64 = 6.0;
-/// Part of the samples of force that belong to it on either side of them, where it is within the noise.
+/// Divisor of the pulse length that gives the margin on either side, where the force is within the
+/// noise.
 const MARGIN: usize = 4;
-/// Fewest parts, as long as the hit, of what follows it.
+/// Minimum number of parts, each as long as the hit, in the remainder.
 const PARTS: usize = 4;
-/// Standard deviations by which the scatter of their means may exceed that of white noise.
+/// Allowed excess scatter of their means over that of white noise, in standard deviations.
 const SCATTER: f64 = 5.0;
 
-/// Where the force of a hit is, if nothing but white noise follows it: the means of parts as long as the hit scatter no more
-/// than their samples say. `None` where something slower follows, as where the hammer is coupled by a capacitor.
+/// The force pulse of a hit, if it is followed by white noise only: the means of parts as long as the hit scatter no
+/// more than their samples imply. `None` if something slower follows, as with an AC-coupled hammer.
 ///
-/// Its noise there would be taken for force, and make the response too small by the factor `1 + N σ²/|U|²` for `N` samples of
-/// the standard deviation `σ` and a spectrum `U` of the force (D. J. Ewins, *Modal Testing*, 2nd ed., 2000, 3.10: force window).
+/// The noise after the pulse would count as force and bias the response low by the factor `1 + N σ²/|U|²` for `N`
+/// samples of standard deviation `σ` and a spectrum `U` of the force (D. J. Ewins, *Modal Testing*, 2nd ed., 2000,
+/// 3.10: force window).
 ///
 /// ```
 /// use torqcomp_dsp::frf::stroke_of;
@@ -355,7 +360,7 @@ pub fn stroke_of(force: &[f64]) -> Option<Stroke> {
     (of_means * range.end as f64 <= most * variance).then_some(Stroke { range, rest })
 }
 
-/// Largest force of a second stroke over that of the peak, if it exceeds `second` after the force had vanished.
+/// Largest force of a second stroke relative to the peak, if it exceeds `second` after the force had vanished.
 fn second_stroke(
     size: &impl Fn(usize) -> f64,
     peak: usize,
@@ -396,13 +401,13 @@ mod tests {
         pulse(4500, 10.0, f64::INFINITY, &mut force);
         pulse(4700, 4.0, f64::INFINITY, &mut force);
         pulse(6500, 9.0, f64::INFINITY, &mut force);
-        // Decays that begin with each hit.
+        // Decays that start with each hit.
         let ring =
             |i: i32| (f64::from(i) * 0.37).sin() * (-f64::from((i + 1500) % 2000) / 200.0).exp();
         let measured: Vec<f64> = (0..8000).map(ring).collect();
         let hits = find_hits(&force, &measured, 1000);
         assert_eq!(hits.len(), 4, "{hits:?}");
-        // Where the response still rings, later hits belong to the first.
+        // While the response is still ringing, later hits belong to the first.
         let endless: Vec<f64> = (0..8000).map(|i| (f64::from(i) * 0.37).sin()).collect();
         assert_eq!(find_hits(&force, &endless, 1000).len(), 1);
         let faults: Vec<&[HitFault]> = hits.iter().map(|h| &h.faults[..]).collect();
@@ -434,7 +439,7 @@ mod tests {
             (2.5, 0.01, true),
             (1.0, 0.01, true),
             (0.6, 0.01, true),
-            // No more than the noise explains, and a ripple of 2 %.
+            // Within what noise and a ripple of 2 % explain.
             (0.4, 0.2, false),
             (0.2, 0.01, false),
         ] {

@@ -1,7 +1,7 @@
-//! Frequency responses from blocks of an applied and a measured signal.
+//! Frequency response functions from blocks of an applied and a measured signal.
 //!
-//! Blocks are segments of noise, periods of a periodic signal, or hits. Each keeps its spectra, so that a response can be
-//! estimated from some blocks and tested on the others.
+//! Blocks are segments of noise, periods of a periodic signal, or hits. Each keeps its spectra, so that a response can
+//! be estimated from some blocks and validated on the others.
 //!
 //! Estimators and bounds: J. S. Bendat, A. G. Piersol, Random Data, 4th ed., 2010, chapters 6 and 9.
 
@@ -13,7 +13,7 @@ use num_complex::Complex64;
 pub use blocks::{Periodic, Window, average_periods, find_period, lines_of, segments, transform};
 pub use hits::{Hit, HitFault, Stroke, find_hits, near_half_rate, noise_share, stroke_of};
 
-/// Spectra of one block, at frequencies k times the step, from 0 to half the rate.
+/// Spectra of one block, at multiples of the frequency step, from 0 to the Nyquist frequency.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Block {
     /// Of the applied signal.
@@ -33,7 +33,7 @@ pub enum Estimator {
     Hv,
 }
 
-/// Power of each signal and cross-power, summed over blocks; every estimate follows from them.
+/// Auto- and cross-power summed over blocks; all estimates follow from them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Powers {
     /// S_xx, S_yy and S_xy at each line.
@@ -65,13 +65,13 @@ impl Powers {
         all
     }
 
-    /// Powers of the other blocks, where `some` are those of some of them.
+    /// Powers of the remaining blocks, `some` being the powers of a subset.
     #[must_use]
     pub fn without(&self, some: &Self) -> Self {
         let pairs = self.sums.iter().zip(&some.sums);
         Self {
             sums: pairs
-                // Rounding must not make a power negative.
+                // Avoids negative power due to rounding.
                 .map(|(all, some)| {
                     let powers = ((all.0 - some.0).max(0.0), (all.1 - some.1).max(0.0));
                     (powers.0, powers.1, all.2 - some.2)
@@ -81,7 +81,7 @@ impl Powers {
         }
     }
 
-    /// The response.
+    /// The estimated response.
     #[must_use]
     pub fn response(&self, estimator: Estimator) -> Frf {
         let n = self.blocks.max(1) as f64;
@@ -130,7 +130,7 @@ impl Frf {
         Self::between(blocks, estimator, 0..usize::MAX)
     }
 
-    /// The same at a range of lines, counted from its start.
+    /// The response at a range of lines, indexed from its start.
     #[must_use]
     pub fn between<'a>(
         blocks: impl Iterator<Item = &'a Block>,
@@ -166,8 +166,8 @@ fn estimate(&(xx, yy, xy): &(f64, f64, Complex64), estimator: Estimator) -> Comp
         Estimator::H2 if xy.norm_sqr() == 0.0 => Complex64::ZERO,
         Estimator::H2 => yy / xy.conj(),
         Estimator::Hv => {
-            // The eigenvector of [[xx, xy*], [xy, yy]] with the larger eigenvalue, after scaling both signals to the
-            // same power, as their units differ.
+            // The eigenvector of [[xx, xy*], [xy, yy]] with the larger eigenvalue, after scaling both signals to
+            // equal power, as their units differ.
             let scale = (yy / xx).sqrt();
             if scale == 0.0 || xy.norm() == 0.0 {
                 return Complex64::ZERO;
@@ -178,7 +178,7 @@ fn estimate(&(xx, yy, xy): &(f64, f64, Complex64), estimator: Estimator) -> Comp
     }
 }
 
-/// Root of the power of `measured − response·applied` over that of `measured`, between two lines.
+/// RMS of `measured − response·applied` relative to that of `measured`, between two lines.
 #[must_use]
 pub fn prediction_error(
     response: &[Complex64],
@@ -208,7 +208,7 @@ mod tests {
         sum
     }
 
-    /// One line, many blocks: y = 2j x + noise, x + noise recorded.
+    /// One line, many blocks: y = 2j x + noise, recorded x + noise.
     fn blocks(count: usize, in_x: f64, in_y: f64) -> Vec<Block> {
         let mut state = 7;
         let mut draw = move |size: f64| Complex64::new(noise(&mut state), noise(&mut state)) * size;

@@ -1,4 +1,4 @@
-//! What a fit leaves over: its size, and its density next to the components.
+//! Residual of a fit: its size, and its density near the components.
 
 use std::f64::consts::TAU;
 
@@ -8,14 +8,15 @@ use super::{SineFit, rotate};
 use crate::Error;
 use crate::store::SampleStore;
 
-/// Bins of the residual's periodogram, on either side of a component, that its uncertainty is taken
-/// from. The nearest one is left out: the fit has emptied it.
+/// Bins of the residual's periodogram, on either side of a component, used for its uncertainty. The
+/// nearest one is excluded, as the fit has emptied it.
 const NEAR_BINS: std::ops::RangeInclusive<usize> = 2..=12;
-/// Fewest residual samples that a periodogram is made of; below, the residual is taken as white.
+/// Minimum number of residual samples for a periodogram; below it, the residual counts as white.
 const FEWEST_FOR_SPECTRUM: usize = 256;
-/// Blocks of a record; within one, the turn between neighbouring bins is a short Taylor series.
+/// Number of blocks of a record; within one, the rotation between neighbouring bins is a short
+/// Taylor series.
 const BLOCKS: usize = 1024;
-/// Terms of that series. The turn is at most 2π·12/1024/2 = 0.037 rad, and 0.037⁵/5! = 6e-10.
+/// Terms of that series. The angle is at most 2π·12/1024/2 = 0.037 rad, and 0.037⁵/5! = 6e-10.
 const TERMS: usize = 5;
 
 /// The residual of a fit.
@@ -26,8 +27,8 @@ pub(super) struct Leftover {
 }
 
 impl Leftover {
-    /// Goes once through the first samples of a record, as many as the fit is of. `lost` are the unknowns that the
-    /// residual has lost.
+    /// Computed in one pass over the samples of the fit. `lost` is the number of degrees of freedom used by the
+    /// fit.
     pub(super) fn of(
         samples: &(impl SampleStore + ?Sized),
         fit: &SineFit,
@@ -57,20 +58,20 @@ impl Leftover {
     }
 }
 
-/// The transform of a record that goes by, at the bins next to a frequency.
+/// Transform of a stream of samples at the bins near a frequency.
 ///
-/// `X(c + d) = Σ_i x_i e^{−2πj (c + d) i/N}`, the sum over the samples taken at the bin c; from it, that at the bins beside
-/// it follows block by block. Without a window, because the fit has none: what a strong line beside the components leaks
-/// into them shows here, too.
+/// `X(c + d) = Σ_i x_i e^{−2πj (c + d) i/N}`: the sum over the samples is taken at the bin c, and the neighbouring bins
+/// follow from it block by block. Without a window, as in the fit, so that the leakage of a strong line into the
+/// components shows here, too.
 struct NearBins {
-    /// The bin that is nearest to the component.
+    /// The bin nearest to the component.
     centre: usize,
     length: usize,
-    /// Samples of a block.
+    /// Samples per block.
     block: usize,
-    /// Of the present block, about its middle: `Σ x_i e^{−2πj c i/N} u^q`, u from −1 to 1.
+    /// Moments of the current block about its middle: `Σ x_i e^{−2πj c i/N} u^q`, u from −1 to 1.
     moments: [Complex64; TERMS],
-    /// At the bins from the lowest to the highest beside the centre.
+    /// Sums at the bins, from the lowest to the highest around the centre.
     sums: Vec<Complex64>,
 }
 
@@ -85,7 +86,7 @@ impl NearBins {
         }
     }
 
-    /// Adds samples that follow those before.
+    /// Adds the next samples.
     fn add(&mut self, start: usize, samples: &[f64]) {
         let (mut at, end) = (start, start + samples.len());
         while at < end {
@@ -100,7 +101,7 @@ impl NearBins {
         }
     }
 
-    /// Half the length of a block, and the middle of one.
+    /// Half-length of a block, and its middle.
     fn half_and_middle(&self, first: usize) -> (f64, f64) {
         let half = 0.5 * self.block as f64;
         (half, first as f64 + half - 0.5)
@@ -121,7 +122,7 @@ impl NearBins {
         self.moments = moments;
     }
 
-    /// Adds a whole block to the bins.
+    /// Adds a complete block to the bins.
     fn close(&mut self, first: usize) {
         let (half, middle) = self.half_and_middle(first);
         let widest = *NEAR_BINS.end() as f64;
@@ -131,7 +132,7 @@ impl NearBins {
             *term /= factorial;
             factorial *= f64::from(next);
         }
-        // From one bin to the next, the angle grows by the same step.
+        // The angle grows by the same step from bin to bin.
         let bin = -TAU / self.length as f64;
         let at_middle = bin * (middle - 0.5 * (self.length - 1) as f64);
         let mut turn = Complex64::from_polar(1.0, -widest * at_middle);
@@ -146,8 +147,8 @@ impl NearBins {
         self.moments = [Complex64::ZERO; TERMS];
     }
 
-    /// Variance of white noise of the mean density over the bins. Those below zero mirror those above; the constant is
-    /// fitted as well.
+    /// Variance of white noise with the mean density over the bins. Negative frequencies mirror positive ones, and
+    /// zero is excluded because the constant is fitted as well.
     fn variance(&self) -> f64 {
         let (last, widest) = (self.length / 2, *NEAR_BINS.end());
         let power = |place: usize, bin: usize| {
@@ -171,7 +172,7 @@ impl NearBins {
 mod tests {
     use super::*;
 
-    /// By the definition, term by term.
+    /// Directly from the definition, term by term.
     fn power(samples: &[f64], bin: usize) -> f64 {
         let turn = |i: usize| -TAU * ((bin * i) % samples.len()) as f64 / samples.len() as f64;
         let terms = samples.iter().enumerate();

@@ -1,4 +1,4 @@
-//! Finding the fundamental from the data.
+//! Estimation of the fundamental from the data.
 
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -9,26 +9,25 @@ use super::{Fundamental, Projections, SineFit, rotate};
 use crate::Error;
 use crate::store::SampleStore;
 
-/// Longest piece that the search by spectrum looks at.
+/// Longest piece used in the spectral search.
 const LONGEST_SEARCH: usize = 1 << 17;
-/// Steps of the refinement at one length of record.
+/// Maximum number of refinement steps at one record length.
 const STEPS: usize = 30;
-/// Turns at the ends of a record within which its frequency must be known before a record of twice the length is looked at.
+/// Uncertainty of the phase at the ends of a record, in turns, required before the record length is doubled.
 const KEPT_TURNS: f64 = 1e-3;
-/// The same for the whole record: rounding in the phase at its ends is the floor.
+/// The same for the whole record, limited by rounding of the phase at its ends.
 const LAST_TURNS: f64 = 1e-10;
 
-/// Finds the fundamental near `start_hz`, within `span` of it (0.01 is one per cent).
+/// Finds the fundamental near `start_hz`, within the fraction `span` of it (0.01 is 1 %).
 ///
-/// First the frequency with the most power at all its orders is looked up in a zero-padded
-/// spectrum, then the sum of squares of the sine fit is made least by Gauss-Newton steps, over
-/// twice the length of record at each stage so that no stage can slip by a period. The standard
-/// uncertainty comes from the residual's density at the orders, each weighed by its pull on the
-/// frequency.
+/// The frequency with the most power at all its orders is found in a zero-padded spectrum; the sum
+/// of squares of the sine fit is then minimised by Gauss–Newton steps, with the record length
+/// doubled at each stage to avoid slipping by a period. The standard uncertainty follows from the
+/// residual's density at the orders, each weighted by its influence on the frequency.
 ///
 /// # Errors
 /// Those of [`super::fit`], and [`Error::NotRefined`] if the best frequency lies at the end of the
-/// span or the steps do not settle.
+/// span or the steps do not converge.
 ///
 /// ```
 /// use torqcomp_dsp::harmonics::refine_fundamental;
@@ -48,7 +47,7 @@ pub fn refine_fundamental(
 ) -> Result<Fundamental, Error> {
     let count = samples.count();
     let mut length = count.min(LONGEST_SEARCH);
-    // Errors of the input are told before the search begins.
+    // Reports input errors before the search begins.
     SineFit::solve(samples, count, sample_rate_hz, start_hz, orders)?;
     let first = samples.part(0..length)?;
     let mut frequency_hz = search(&first, sample_rate_hz, start_hz, span, orders);
@@ -106,18 +105,19 @@ fn search(samples: &[f64], rate_hz: f64, start_hz: f64, span: f64, orders: &[f64
         .0
 }
 
-/// A frequency of which the last step was small enough.
+/// A frequency whose last step was small enough.
 struct Settled {
     frequency_hz: f64,
     /// The fit before the last step.
     fit: SineFit,
-    /// Sum of squares of the derivative by the frequency, less what the amplitudes take up.
+    /// Sum of squares of the derivative with respect to frequency, minus the part explained by the
+    /// amplitudes.
     weight: f64,
 }
 
 impl Settled {
-    /// Gauss-Newton on the frequency, the amplitudes being fitted anew at each step, until a step turns the ends of the
-    /// first `length` samples by less than `turns`.
+    /// Gauss–Newton on the frequency, with the amplitudes refitted at each step, until a step changes the phase at the
+    /// ends of the first `length` samples by less than `turns`.
     fn of(
         samples: &(impl SampleStore + ?Sized),
         length: usize,
@@ -153,8 +153,8 @@ impl Settled {
         })
     }
 
-    /// `σ²_f = Σ_k w_k S(f_k)(f_s/2) / (Σ w_k)²`, `w_k` being the part of the slope's square that
-    /// order `k` brings.
+    /// `σ²_f = Σ_k w_k S(f_k)(f_s/2) / (Σ w_k)²`, `w_k` being the contribution of order `k` to the
+    /// squared derivative.
     fn std_hz(&self, samples: &(impl SampleStore + ?Sized), orders: &[f64]) -> Result<f64, Error> {
         let leftover = Leftover::of(samples, &self.fit, self.fit.unknowns() + 1)?;
         let pulls: Vec<f64> = orders
@@ -170,9 +170,9 @@ impl Settled {
 }
 
 impl SineFit {
-    /// Product of the residual and the model's derivative by the fundamental, and the sum of squares of what of that
-    /// derivative mean and amplitudes cannot take up, `Σ d² − bᵀ G⁻¹ b`. The residual has nothing in common with what
-    /// they can.
+    /// Inner product of the residual and the model's derivative with respect to the fundamental, and the sum of
+    /// squares of the part of that derivative orthogonal to mean and amplitudes, `Σ d² − bᵀ G⁻¹ b`. The residual is
+    /// orthogonal to mean and amplitudes.
     fn pull_and_weight(
         &self,
         samples: &(impl SampleStore + ?Sized),
@@ -195,7 +195,7 @@ impl SineFit {
         Ok((pull, square - taken_up))
     }
 
-    /// Derivative of the model by the fundamental, at the samples of a part.
+    /// Derivative of the model with respect to the fundamental, at the samples of a part.
     fn slope(&self, part: Range<usize>, orders: &[f64], rate_hz: f64) -> Vec<f64> {
         let middle = 0.5 * (self.length - 1) as f64;
         let mut slope = vec![0.0; part.len()];

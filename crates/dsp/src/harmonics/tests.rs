@@ -54,7 +54,7 @@ fn many_orders_come_back_exactly_from_a_broken_number_of_periods() {
 
 #[test]
 fn agrees_with_plain_normal_equations() {
-    // The design matrix written out and solved by its singular values: slow, and independent.
+    // The explicit design matrix solved by singular value decomposition: slow, but independent.
     let mut noise = Normal(3);
     let x: Vec<f64> = (0..301).map(|_| noise.next()).collect();
     let (rate, f1, orders) = (1000.0, 7.3, [0.5, 1.0, 2.0, 7.0]);
@@ -78,7 +78,7 @@ fn agrees_with_plain_normal_equations() {
     }
 }
 
-/// Runs many noisy fits; gives the spread of the estimate over the stated uncertainty.
+/// Runs many noisy fits; returns the ratio of the estimate's spread to the stated uncertainty.
 fn spread_over_stated(colour: f64, refine: bool) -> (f64, f64) {
     let runs = 300;
     let (mut amplitude, mut stated, mut phase, mut stated_phase) = (0.0, 0.0, 0.0, 0.0);
@@ -108,7 +108,7 @@ fn spread_over_stated(colour: f64, refine: bool) -> (f64, f64) {
 
 #[test]
 fn stated_uncertainty_is_the_spread() {
-    // 300 runs fix a standard deviation to about 4 %; the bounds are three of those wide.
+    // 300 runs give a standard deviation to about 4 %; the bounds are three times that.
     for (colour, refine) in [(0.0, false), (0.9, false), (0.0, true), (0.9, true)] {
         let (amplitude, phase) = spread_over_stated(colour, refine);
         assert!(
@@ -124,7 +124,7 @@ fn stated_uncertainty_is_the_spread() {
 
 #[test]
 fn a_strong_line_that_is_not_fitted_counts() {
-    // What 3 at 588 Hz leaks to 1 at 60 Hz within 0.3 s is far more than the noise.
+    // The leakage of 3 at 588 Hz into 1 at 60 Hz within 0.3 s far exceeds the noise.
     let mut square = 0.0;
     let mut stated = 0.0;
     for run in 0..40 {
@@ -173,7 +173,7 @@ fn what_cannot_be_told_apart_is_refused() {
     );
     let same = fit(&x, 1000.0, 0.0, Fundamental::given(50.0), &[1.0, 1.0]);
     assert!(matches!(same, Err(Error::NotSeparable { .. })));
-    // A tenth of a period is not told from the constant.
+    // A tenth of a period cannot be separated from the constant.
     let slow = fit(&x, 1000.0, 0.0, Fundamental::given(0.1), &[1.0]);
     assert!(matches!(slow, Err(Error::NotSeparable { .. })));
     let high = fit(&x, 1000.0, 0.0, Fundamental::given(250.0), &[2.0]);

@@ -1,42 +1,43 @@
-//! Time stamps that are rounded and leave out samples at some places.
+//! Rounded time stamps with missing samples.
 
 use std::ops::Range;
 
 use super::rounding::{FEWEST, FINE, Rounded, quantum, simplest, slopes};
 
-/// Coarsely rounded stamps of a uniform axis from which samples are missing.
+/// Coarsely rounded stamps of a uniform time axis with missing samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BrokenLine {
     /// The axis between the breaks.
     pub line: Rounded,
-    /// Where samples are missing.
+    /// Locations of missing samples.
     pub breaks: Vec<Break>,
 }
 
-/// A place at which samples are missing.
+/// A break where samples are missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Break {
-    /// Index of the first sample behind it.
+    /// Index of the first sample after the break.
     pub index: usize,
-    /// Number of samples missing, as near as the stamps say.
+    /// Number of missing samples, as precisely as the stamps show.
     pub missing: usize,
 }
 
-/// Least quantum, as a part of the step, from which on single steps say little; finer stamps show each gap by itself.
+/// Minimum quantum relative to the step; with finer stamps each gap shows by itself.
 const COARSE: f64 = 0.25;
-/// Fewest samples for each break, on average; breaks that are denser are jitter.
+/// Minimum average number of samples between breaks; more frequent breaks are jitter.
 const BETWEEN_BREAKS: usize = 50;
-/// Breaks that may come at once.
+/// Number of breaks allowed beyond that average.
 const AT_ONCE: usize = 3;
-/// Relative difference within which steps are equal to that of the line, whose slope a few stamps leave open.
+/// Relative difference within which steps equal that of the line, whose slope is uncertain for few stamps.
 const EQUAL: f64 = 0.05;
-/// Largest distance of the missing samples from a whole number.
+/// Largest deviation of the number of missing samples from an integer.
 const WHOLE: f64 = 0.3;
 
 impl BrokenLine {
-    /// The lines of one step `b` that rounded stamps `tᵢ` lie on piece by piece: within a piece, an `a` exists with
-    /// `tᵢ ≤ a + b i ≤ tᵢ + q` for the quantum `q`, and from piece to piece `a` rises by a whole number of steps, the missing
-    /// samples. `None` if the stamps are not coarse, fall, break off too often, or leave out no whole samples.
+    /// A piecewise straight line of one step `b` through rounded stamps `tᵢ`: within a piece, an `a` exists with
+    /// `tᵢ ≤ a + b i ≤ tᵢ + q` for the quantum `q`, and from piece to piece `a` rises by a whole number of steps, the
+    /// missing samples. `None` if the stamps are not coarse, decrease, have too many breaks, or miss a non-integer
+    /// number of samples.
     ///
     /// ```
     /// use torqcomp_dsp::quality::broken_line::{Break, BrokenLine};
@@ -65,7 +66,8 @@ impl BrokenLine {
             steps = within(&points[piece.clone()], steps)?;
         }
         let is_coarse = steps[0] > 0.0 && COARSE * steps[1] < 1.0;
-        // Mostly equal steps show each gap by themselves, and so do single ones among equal steps of one quantum.
+        // Where most steps are equal, or there are single steps among equal ones of one quantum, each gap shows
+        // by itself.
         let step = simplest(steps.map(|step| step * quantum_s)) / quantum_s;
         let others = |step: f64| {
             let other = |pair: &&[(f64, f64)]| ((pair[1].1 - pair[0].1) / step - 1.0).abs() > EQUAL;
@@ -86,7 +88,7 @@ impl BrokenLine {
         })
     }
 
-    /// Of each sample its place on the axis, the missing ones counted.
+    /// Index of each sample on the axis, counting missing ones.
     pub fn places(&self, samples: usize) -> impl Iterator<Item = usize> {
         let (mut breaks, mut missing) = (self.breaks.iter().peekable(), 0);
         (0..samples).map(move |index| {
@@ -104,7 +106,7 @@ impl BrokenLine {
     }
 }
 
-/// The longest pieces, one behind the other, that a line of a slope within the range explains.
+/// Consecutive pieces, each as long as a line with a slope in the range explains.
 fn pieces(points: &[(f64, f64)], range: [f64; 2]) -> Option<Vec<Range<usize>>> {
     let (mut found, mut start) = (Vec::new(), 0);
     while start < points.len() {
@@ -113,7 +115,7 @@ fn pieces(points: &[(f64, f64)], range: [f64; 2]) -> Option<Vec<Range<usize>>> {
         let mut good = 1;
         let mut bad = rest.len() + 1;
         while good + 1 < bad {
-            // Doubled until it is too long, then halved between.
+            // Doubled until too long, then bisected.
             let next = if bad > rest.len() {
                 (2 * good).min(rest.len())
             } else {
@@ -130,7 +132,7 @@ fn pieces(points: &[(f64, f64)], range: [f64; 2]) -> Option<Vec<Range<usize>>> {
     Some(found)
 }
 
-/// The slopes of a range that explain a piece; a single point allows all.
+/// The range of slopes that explain a piece; a single point allows all.
 fn within(piece: &[(f64, f64)], range: [f64; 2]) -> Option<[f64; 2]> {
     match piece.len() {
         ..2 => Some(range),
@@ -138,7 +140,7 @@ fn within(piece: &[(f64, f64)], range: [f64; 2]) -> Option<[f64; 2]> {
     }
 }
 
-/// The samples missing from piece to piece.
+/// Number of missing samples between pieces.
 fn breaks(points: &[(f64, f64)], pieces: &[Range<usize>], step: f64) -> Option<Vec<Break>> {
     // The middle of the offsets that explain a piece.
     let offset = |piece: &Range<usize>| {
@@ -166,7 +168,7 @@ mod tests {
     use super::super::testing::noise;
     use super::*;
 
-    /// Stamps of a record at a rate, in so many decimals, without the samples of a range.
+    /// Time stamps at a rate, with this many decimals, without the samples of a range.
     fn stamps(rate_hz: f64, decimals: i32, count: usize, lost: Range<usize>) -> Vec<f64> {
         let scale = 10_f64.powi(decimals);
         let kept = (0..count).filter(|i| !lost.contains(i));
@@ -182,7 +184,7 @@ mod tests {
             (5000.0, 3, 20_000, 9000..9100),
             (1500.0, 3, 8000, 4000..4004),
             (2000.0, 0, 60_000, 20_003..24_003),
-            // Within one stamp of a second.
+            // Within one second's stamp.
             (2000.0, 0, 60_000, 20_003..21_003),
             (300.0, 2, 9000, 8000..8007),
         ] {
@@ -194,7 +196,7 @@ mod tests {
             };
             let off = gap.missing.abs_diff(lost.len());
             assert!(off <= 1 + lost.len() / 100, "{what}");
-            // The next stamp that shows it lies within a quantum.
+            // The next stamp that reveals it lies within a quantum.
             let within = 1.5 * rate_hz / 10_f64.powi(decimals) + 2.0;
             assert!(
                 (gap.index as f64 - lost.start as f64).abs() <= within,
@@ -205,7 +207,8 @@ mod tests {
 
     #[test]
     fn one_gap_among_equal_steps_is_no_rounding() {
-        // Eleven of twelve stamps at 10 Hz: a rate of 9.1 Hz in tenths of a second has the same ones.
+        // Eleven of twelve stamps at 10 Hz: a rate of 9.1 Hz in tenths of a second gives the same
+        // ones.
         let lost = stamps(10.0, 1, 12, 5..6);
         assert_eq!(BrokenLine::of(&lost), None);
     }

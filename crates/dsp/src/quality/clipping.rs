@@ -1,25 +1,25 @@
-//! Clipping: a signal cut off at its highest or lowest value.
+//! Clipping: a signal truncated at its highest or lowest value.
 
 use super::pile_up::pile_up;
 use super::quantisation::quantisation;
 use super::runs::Lengths;
 use super::{Run, range, runs};
 
-/// Fewest equal samples that can be a cut-off peak.
+/// Minimum number of equal samples of a clipped peak.
 const SHORTEST: usize = 3;
-/// A cut-off peak is longer than this many times what 95 % of the other runs are.
+/// Minimum length of a clipped peak, relative to the 95th percentile of the other runs.
 const LONGER: usize = 2;
-/// Resolution steps that a parabola through three rounded samples can be wrong by: (3 + 3 + 1)/2 of
+/// Largest error of a parabola through three rounded samples, in resolution steps: (3 + 3 + 1)/2 of
 /// its own and a half of the extreme one.
 pub(super) const ROUNDING: f64 = 4.0;
-/// Resolution, as a part of the range, that is assumed where it cannot be seen.
+/// Assumed resolution, relative to the range, where it cannot be determined.
 const FINE: f64 = 1e-3;
-/// Part of the runs at the extreme value that must be cut off, not smooth.
+/// Minimum fraction of the runs at the extreme value that must be abrupt rather than smooth.
 const PART: f64 = 1.0 / 3.0;
-/// Part of all samples at both extremes from which a signal is one that switches.
+/// Fraction of all samples at both extremes above which a signal is a switching one.
 const SWITCHING: f64 = 0.85;
 
-/// Where a channel is clipped.
+/// Clipping of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clipping {
     /// At its lowest value.
@@ -28,16 +28,16 @@ pub struct Clipping {
     pub high: Option<Rail>,
 }
 
-/// A value that a signal is cut off at.
+/// A clipping level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rail {
     /// The value.
     pub value: f64,
-    /// Width of the part of the range in which the samples lie; 0 if all have exactly this value.
+    /// Width of the range that contains the clipped samples; 0 if all are equal to `value`.
     pub spread: f64,
-    /// Samples that have this value, or lie in that part.
+    /// Number of samples at this value, or within that range.
     pub samples: usize,
-    /// Runs of them that are longer than anywhere else.
+    /// Number of runs of them that are longer than anywhere else.
     pub runs: usize,
     /// The longest of these.
     pub longest: usize,
@@ -46,20 +46,20 @@ pub struct Rail {
 }
 
 impl Clipping {
-    /// Where a signal is cut off: at one value ([`clipping`]), or at a level that noise was added to ([`pile_up`]).
+    /// Clipping at one value ([`clipping`]), or at a level with noise added to it ([`pile_up`]).
     #[must_use]
     pub fn of(samples: &[f64]) -> Option<Self> {
         clipping(samples).or_else(|| pile_up(samples))
     }
 
-    /// Samples at either rail.
+    /// Number of samples at either rail.
     #[must_use]
     pub fn samples(&self) -> usize {
         let count = |rail: Option<Rail>| rail.map_or(0, |rail| rail.samples);
         count(self.low) + count(self.high)
     }
 
-    /// Whether a sample is cut off.
+    /// Whether a sample is clipped.
     ///
     /// ```
     /// use torqcomp_dsp::quality::clipping::clipping;
@@ -74,23 +74,23 @@ impl Clipping {
     }
 }
 
-/// Tells whether a signal is cut off at its extreme values.
+/// Detects clipping of a signal at its extreme values.
 ///
-/// A run of samples at exactly the extreme value `E` is a cut-off peak if
+/// A run of samples at exactly the extreme value `E` is a clipped peak if
 /// 1. it has at least 3 samples and more than twice as many as 95 % of the runs elsewhere (slow,
 ///    quantised or held signals repeat values everywhere), and
-/// 2. the signal was on its way beyond `E`: the parabola `3y₁ − 3y₂ + y₃` through samples at
-///    distances 0, s and 2s before the run (or after it, backwards in time) passes `E` by more than
-///    4 steps of the resolution, for some `s` up to half the length of the run.
+/// 2. the signal was heading beyond `E`: the parabola `3y₁ − 3y₂ + y₃` through samples at distances 0,
+///    s and 2s before the run (or after it, backwards in time) exceeds `E` by more than 4 steps of the
+///    resolution, for some `s` up to half the length of the run.
 ///
 /// One in three runs must be like that. A quantised but complete peak stays within 4 steps, since
-/// three rounded samples move the parabola by 3.5 at most; a signal that comes to rest smoothly
-/// (position, temperature) bends towards `E` and passes it nowhere; noise in fine resolution hits the
-/// same value three times in a row with a chance below `(step/σ)²` for each sample. A signal whose
-/// samples lie at its two extremes for more than 85 % switches between them and is not judged. What
-/// remains possible is a plateau that a signal really has, entered with a kink: the limit of a
-/// command looks the same as that of an amplifier. Zero is such a plateau of everything that rests, so
-/// that an extreme of exactly 0 is never called clipped.
+/// three rounded samples move the parabola by at most 3.5; a signal that settles smoothly (position,
+/// temperature) bends towards `E` and never exceeds it; noise in fine resolution hits the same value
+/// three times in a row with a probability below `(step/σ)²` per sample. A signal with more than 85 %
+/// of its samples at its two extremes is a switching one and is not judged. A genuine plateau of the
+/// signal, entered with a kink, remains possible: a limited command looks the same as a limited
+/// amplifier. Zero is such a plateau of everything at rest, so an extreme of exactly 0 is never called
+/// clipped.
 ///
 /// ```
 /// use torqcomp_dsp::quality::clipping::clipping;
@@ -138,13 +138,13 @@ pub fn clipping(samples: &[f64]) -> Option<Clipping> {
     (found.low.is_some() || found.high.is_some()).then_some(found)
 }
 
-/// Distance of an extreme value from the nearest other one, as far as it can be the resolution.
+/// Distance of an extreme value from the nearest other one, as far as that can be the resolution.
 fn nearest(samples: &[f64], extreme: f64, range: f64) -> f64 {
     let others = samples.iter().filter(|x| x.is_finite() && **x != extreme);
     others.fold(FINE * range, |least, x| least.min((x - extreme).abs()))
 }
 
-/// The rail that the runs lie at, if enough of them are cut-off peaks. `sign` is 1 for the highest
+/// The rail at which the runs lie, if enough of them are clipped peaks. `sign` is 1 for the highest
 /// value, −1 for the lowest.
 fn rail(samples: &[f64], at: &[Run], sign: f64, step: f64) -> Option<Rail> {
     let first = at.first()?;
@@ -163,13 +163,13 @@ fn rail(samples: &[f64], at: &[Run], sign: f64, step: f64) -> Option<Rail> {
     })
 }
 
-/// Whether the signal was on its way beyond the run's value, before it or (backwards) after it.
+/// Whether the signal was heading beyond the run's value, before it or (backwards) after it.
 fn is_cut(samples: &[f64], run: &Run, sign: f64, tolerance: f64) -> bool {
     let beyond = goes_beyond(samples, run, sign, run.value * sign + tolerance);
     beyond.contains(&true)
 }
 
-/// Whether the signal was on its way beyond a bound (times `sign`) before a run, and backwards after it.
+/// Whether the signal was heading beyond a bound (times `sign`) before a run, and backwards after it.
 pub(super) fn goes_beyond(samples: &[f64], run: &Run, sign: f64, bound: f64) -> [bool; 2] {
     let before = |distance: usize| run.start.checked_sub(1 + distance).map(|i| samples[i]);
     let after = |distance: usize| samples.get(run.end() + distance).copied();
@@ -177,7 +177,7 @@ pub(super) fn goes_beyond(samples: &[f64], run: &Run, sign: f64, bound: f64) -> 
         let (Some(y1), Some(y2), Some(y3)) = (at(0), at(s), at(2 * s)) else {
             return false;
         };
-        // Not true for samples that are no numbers.
+        // False for NaN.
         sign * (3.0 * y1 - 3.0 * y2 + y3) > bound
     };
     let distances = || {
@@ -229,7 +229,7 @@ mod tests {
                     let found = clipping(&record);
                     let rails = found.map(|c| (c.low.is_some(), c.high.is_some()));
                     let what = format!("period {period}, level {level}, step {step}");
-                    // A peak of less than three samples or seven codes is not seen.
+                    // A peak of less than three samples or seven codes is not detected.
                     let samples = (2.0 * (1.0_f64 - level)).sqrt() * period / std::f64::consts::PI;
                     if samples > 4.0 && 1.0 - level > 7.0 * step {
                         assert_eq!(rails, Some((true, true)), "{what}");

@@ -1,49 +1,49 @@
-//! Channels that are copies or multiples of each other.
+//! Detection of channels that are copies or multiples of each other.
 
 use super::quantisation::quantisation;
 use super::{is_straight, range, runs};
 
-/// Largest difference from a multiple, as a part of the range, whatever the resolution.
+/// Largest deviation from a multiple, relative to the range, whatever the resolution.
 const FINE: f64 = 1e-5;
-/// Changes of value that a channel must have before agreeing with it means anything.
+/// Minimum number of changes of value for agreement with a channel to be meaningful.
 const FEWEST_CHANGES: usize = 10;
-/// Resolution steps within the range, for the same reason.
+/// Minimum number of resolution steps within the range, for the same reason.
 const FEWEST_LEVELS: f64 = 8.0;
-/// Samples that a pair is tried on before it is looked at as a whole.
+/// Number of samples for a quick test of a pair.
 const PROBES: usize = 64;
-/// Most significant digits of a text that counts as rounded by them.
+/// Maximum number of significant digits in a text that counts as rounded.
 const MOST_DIGITS: i32 = 8;
 
-/// How one channel follows from another: `y = factor · x + offset`.
+/// Relation between two channels: `y = factor · x + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relation {
     /// Factor.
     pub factor: f64,
     /// Offset, in the unit of `y`.
     pub offset: f64,
-    /// Whether every sample is the same to the last bit.
+    /// Whether all samples are bitwise identical.
     pub identical: bool,
 }
 
-/// What is known of a channel before it is compared with others.
+/// Properties of a channel, computed before comparing it with others.
 #[derive(Debug, Clone)]
 pub struct Portrait<'a> {
     samples: &'a [f64],
     low: f64,
     high: f64,
-    /// Index of the lowest sample and of the highest one.
+    /// Indices of the lowest and the highest sample.
     ends: (usize, usize),
-    /// Resolution; 0 if it is too fine to be seen.
+    /// Resolution; 0 if too fine to determine.
     step: f64,
-    /// Significant digits that its values are written with, if they are few.
+    /// Number of significant digits of its values, if small.
     digits: Option<i32>,
-    /// Whether it is a straight line over its index: a counter, a time axis.
+    /// Whether it is a straight line over its index, such as a counter or time axis.
     is_straight: bool,
 }
 
 impl<'a> Portrait<'a> {
-    /// Looks at a channel; `None` if it says too little to be compared: fewer than ten changes of
-    /// value, or samples that are no finite numbers.
+    /// Analyses a channel; `None` if it is unsuitable for comparison: fewer than ten changes of
+    /// value, or non-finite samples.
     #[must_use]
     pub fn of(samples: &'a [f64]) -> Option<Self> {
         let (low, high) = range(samples)?;
@@ -62,26 +62,25 @@ impl<'a> Portrait<'a> {
         })
     }
 
-    /// Largest error of a value as written.
+    /// Largest rounding error of a value as written.
     fn rounding(&self, value: f64) -> f64 {
         let of_digits = self.digits.filter(|_| value != 0.0).map_or(0.0, |digits| {
             10_f64.powi(value.abs().log10().floor() as i32 + 1 - digits)
         });
-        // A hair over one half: the line is laid through rounded samples.
+        // Slightly over one half, as the line is fitted to rounded samples.
         0.51 * self.step.max(of_digits)
     }
 }
 
 /// How `y` follows from `x`, if it does: `|y − (a x + b)| ≤ δ_y + |a| δ_x` at every sample, `δ` being
-/// half a step of each channel's resolution (or half a unit of the last digit it is written with),
-/// or 10⁻⁵ of the range of `y` if that is more. `a` and `b` come from the extreme samples of `x` and
-/// are then fitted by least squares.
+/// half a step of each channel's resolution (or half a unit of its last written digit), or 10⁻⁵ of the
+/// range of `y` if that is larger. `a` and `b` come from the extreme samples of `x` and are then fitted
+/// by least squares.
 ///
-/// Two channels that have nothing to do with each other agree by chance at one sample with a
-/// probability of at most 1/4 (there must be 8 resolution steps in the range), so that ten changes of
-/// value bring it to 10⁻⁶. Measured channels that should be the same differ by their noise and are not
-/// reported. Straight lines (time axes, counters) are multiples of each other by nature: of those, only
-/// identical ones count.
+/// Two unrelated channels agree by chance at one sample with a probability of at most 1/4 (with at
+/// least 8 resolution steps in the range), so ten changes of value bring it to 10⁻⁶. Measured channels
+/// of the same quantity differ by their noise and are not reported. Straight lines (time axes,
+/// counters) are multiples of each other by nature, so only identical ones count.
 ///
 /// ```
 /// use torqcomp_dsp::quality::copies::{Portrait, relation};
@@ -114,7 +113,7 @@ pub fn relation(x: &Portrait, y: &Portrait) -> Option<Relation> {
         offset: y.samples[low] - factor * x.low,
         identical: false,
     };
-    // Two rounded samples fix the line to twice what a sample is rounded by.
+    // Two rounded samples determine the line to twice the rounding error of a sample.
     let stride = (x.samples.len() / PROBES).max(1);
     let near = agrees(x, y, &first, 3.0, stride);
     let fitted = near.then(|| fit(x.samples, y.samples))?;
@@ -130,7 +129,7 @@ fn agrees(x: &Portrait, y: &Portrait, line: &Relation, times: f64, stride: usize
     })
 }
 
-/// Least squares.
+/// Least-squares fit.
 fn fit(x: &[f64], y: &[f64]) -> Relation {
     let count = x.len() as f64;
     let mean = |v: &[f64]| v.iter().sum::<f64>() / count;
@@ -147,7 +146,7 @@ fn fit(x: &[f64], y: &[f64]) -> Relation {
     }
 }
 
-/// Significant digits that some of the values need, if these are few.
+/// Number of significant digits needed by a sample of the values, if small.
 fn significant_digits(samples: &[f64]) -> Option<i32> {
     let stride = (samples.len() / PROBES).max(1);
     let most = samples

@@ -1,18 +1,18 @@
-//! Samples that are no finite numbers.
+//! Detection of non-finite samples.
 
-/// Where a channel has no finite numbers.
+/// Non-finite samples of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NonFinite {
-    /// How many samples.
+    /// Number of samples.
     pub count: usize,
     /// Index of the first.
     pub first: usize,
-    /// The most of them in a row.
+    /// Longest run.
     pub longest: usize,
 }
 
-/// Counts the samples that are `NaN` or infinite; `None` if all are finite. A count, not an estimate:
-/// there is no false alarm.
+/// Counts the samples that are `NaN` or infinite; `None` if all are finite. Exact, so there are no
+/// false alarms.
 ///
 /// ```
 /// use torqcomp_dsp::quality::finite::non_finite;

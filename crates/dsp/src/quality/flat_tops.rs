@@ -1,29 +1,30 @@
-//! Peaks of a ringing that an amplifier cut off before its filter rounded them again.
+//! Peaks of a decay clipped by an amplifier and rounded again by the filter after it.
 
 use super::clipping::{Clipping, Rail};
 use super::median;
 
-/// Fewest samples of a half cycle that is judged.
+/// Minimum number of samples of a half cycle that is judged.
 const SHORTEST: usize = 8;
-/// Part of the peak above which its breadth is taken.
+/// Fraction of the peak above which its width is measured.
 const HIGH: f64 = 0.9;
-/// Least part of a half cycle above it that is flat: of a sine `1 − 2 arcsin(0.9)/π` = 0.287 are, of a square all.
+/// Minimum fraction of a half cycle above `HIGH` for a flat top; a sine has `1 − 2 arcsin(0.9)/π` = 0.287, a
+/// square wave 1.
 const FLAT: f64 = 0.42;
-/// Most of it that is a peak as it should be.
+/// Maximum of that fraction for a normal peak.
 const ROUND: f64 = 0.36;
-/// Largest relative difference of the levels of flat peaks.
+/// Largest relative difference between the levels of flat peaks.
 const LEVEL: f64 = 0.03;
-/// Fewest flat peaks of a side.
+/// Minimum number of flat peaks on one side.
 const FEWEST: usize = 2;
-/// Part below the level from which on a peak was not cut off.
+/// Relative distance below the level from which a peak was not clipped.
 const BELOW: f64 = 0.15;
 
-/// A half cycle of a ringing.
+/// A half cycle of a decay.
 struct HalfCycle {
     start: usize,
     length: usize,
     peak: f64,
-    /// Part of its samples above 0.9 of the peak.
+    /// Fraction of its samples above 0.9 of the peak.
     breadth: f64,
 }
 
@@ -40,12 +41,12 @@ impl HalfCycle {
     }
 }
 
-/// Tells whether the first peaks of a ringing were cut off at a level below the recorder's limit, with a filter behind.
+/// Detects clipping of the first peaks of a decay at a level below the recorder's limit, followed by a filter.
 ///
-/// From its largest peak on, the half cycles of a side about the median are taken one after the other: the first ones are cut
-/// off if two or more have the same height within 3 % and more than 42 % of their time above 0.9 of it, and
-/// all further ones are lower and as round as a sine. What lies within 15 % of the level counts as cut off, since the
-/// filter smears that.
+/// From the largest peak on, the half cycles on one side of the median are examined in order: the first ones are
+/// clipped if two or more have the same height within 3 % and more than 42 % of their time above 0.9 of it, and all
+/// later ones are lower and as round as a sine. Samples within 15 % of the level count as clipped, since the filter
+/// smears that.
 ///
 /// ```
 /// use torqcomp_dsp::quality::flat_tops::flat_tops;
@@ -84,12 +85,12 @@ pub fn flat_tops(samples: &[f64]) -> Option<Clipping> {
     (found.low.is_some() || found.high.is_some()).then_some(found)
 }
 
-/// The level of the first half cycles of a side, about the middle, if they are cut off.
+/// The level of the first half cycles on one side of the median, if they are clipped.
 fn rail(side: &[HalfCycle]) -> Option<Rail> {
     let level = side.iter().fold(0.0_f64, |most, half| most.max(half.peak));
     let is_flat = |half: &&HalfCycle| half.breadth > FLAT && half.peak > (1.0 - LEVEL) * level;
     let flat: Vec<&HalfCycle> = side.iter().take_while(is_flat).collect();
-    // Between flat and round the filter hides the level.
+    // Between flat and round peaks the filter hides the level.
     let further = &side[flat.len()..];
     let lower = further
         .iter()
@@ -115,7 +116,7 @@ mod tests {
         (0..6000).map(at).collect()
     }
 
-    /// Cut off at a level, then through a low-pass of second order.
+    /// Clipped at a level, then low-pass filtered, second order.
     fn cut(samples: &[f64], level: f64, pass: f64) -> Vec<f64> {
         let mut state = [0.0; 2];
         let next = |x: &f64| {
@@ -142,9 +143,9 @@ mod tests {
                     let second = ring(6.3 * omega, ratio, 0.4);
                     let two: Vec<f64> = second.iter().map(|x| 0.3 * x).collect();
                     assert_eq!(flat_tops(&sum(&whole, &two)), None, "{what}");
-                    // Cut off to the end, nothing shows how it would have gone on.
+                    // If all peaks are clipped, the continuation is unknown.
                     let left = (-ratio * omega * 6000.0).exp();
-                    // Of few cycles above the level, not two are flat enough.
+                    // With few cycles above the level, fewer than two are flat enough.
                     let cycles = |level: f64| -level.ln() / (std::f64::consts::TAU * ratio);
                     let is_seen = |level: &f64| left < 0.5 * level && cycles(*level) > 5.0;
                     for level in [0.3, 0.5].into_iter().filter(is_seen) {

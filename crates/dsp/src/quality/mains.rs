@@ -1,4 +1,4 @@
-//! Mains hum: lines at 50 or 60 Hz and their multiples that stand out of the spectrum.
+//! Mains hum: spectral lines at 50 or 60 Hz and their multiples.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -8,43 +8,44 @@ use crate::spectrum::{Density, PowerSum};
 
 /// Mains frequencies of the world, Hz.
 const NOMINAL_HZ: [f64; 2] = [50.0, 60.0];
-/// Highest multiple that is looked at.
+/// Highest order examined.
 const ORDERS: usize = 10;
-/// Length of a block: a resolution of 0.5 Hz.
+/// Block length, for a resolution of 0.5 Hz.
 const BLOCK_S: f64 = 2.0;
-/// Shortest block that will do: 1 Hz.
+/// Shortest permitted block length: 1 Hz.
 const SHORTEST_S: f64 = 1.0;
-/// Blocks that are transformed of a long record.
+/// Maximum number of blocks transformed.
 const MOST_BLOCKS: usize = 32;
-/// How far mains may be off, as a fraction: 0.1 Hz of 50 Hz, which grids keep within but for seconds.
+/// Relative tolerance of the mains frequency: 0.1 Hz at 50 Hz, exceeded by grids only for seconds.
 const OFF: f64 = 0.002;
-/// Bins on either side of a line that a Hann window spreads it over.
+/// Half-width of a line in bins with a Hann window.
 const LOBE: usize = 3;
-/// Bins beyond them, on either side, that a line must stand out of.
+/// Number of bins beyond that, on either side, that a line must exceed.
 const BESIDE: usize = 14;
-/// Power of a line over that of the highest bin beside it.
+/// Minimum power of a line relative to the highest of the neighbouring bins.
 const PROMINENCE: f64 = 6.0;
-/// Amplitude of the strongest line, over the rms of the record without its mean, that is worth saying.
+/// Minimum amplitude of the strongest line, relative to the RMS of the record without its mean.
 const SMALLEST: f64 = 1e-3;
-/// Amplitude, over the rms of the record with its mean, that the rounding of a transform can make.
+/// Amplitude, relative to the RMS of the record with its mean, explained by rounding of the
+/// transform.
 const ROUNDING: f64 = 1e-9;
-/// Largest denominator of the fractions of a mains frequency at which a shaft that makes a line there
-/// is expected to make others.
+/// Largest denominator of a simple fraction of the mains frequency: a shaft whose order falls on the
+/// mains is expected to show a line there.
 const LARGEST_DENOMINATOR: usize = 6;
-/// Orders of a shaft by which a line is recognised as its own.
+/// Number of shaft orders used to attribute a line to a shaft.
 const SHAFT_ORDERS: usize = 6;
 
-/// Lines of the mains in a record.
+/// Mains lines in a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mains {
     /// 50 or 60 Hz.
     pub nominal_hz: f64,
-    /// The lines, the lowest first.
+    /// The lines in ascending order.
     pub lines: Vec<MainsLine>,
-    /// Distance of the spectrum's frequencies: lines closer together are one.
+    /// Frequency resolution: lines closer together are not resolved.
     pub resolution_hz: f64,
-    /// A line at a simple fraction of the mains frequency (denominator up to 6), if there is one: then
-    /// all of them may be orders of a shaft.
+    /// A line at a simple fraction of the mains frequency (denominator up to 6), if any: all lines may
+    /// then be shaft orders.
     pub shaft_hz: Option<f64>,
 }
 
@@ -62,23 +63,22 @@ pub struct MainsLine {
     pub prominence: f64,
 }
 
-/// Looks for mains lines in a uniformly sampled record. `None` if there are none, or if the record is
-/// too short (1 s), too slow (the mains must lie below 0.45 of the rate) or holds no whole block of
-/// finite samples.
+/// Looks for mains lines in a uniformly sampled record. `None` if there are none, or if the record is too short (1
+/// s), too slow (the mains must lie below 0.45 of the rate) or contains no whole block of finite samples.
 ///
-/// The spectrum is Welch's, with Hann windows of 2 s (1 s at least), in which grids keep their
-/// frequency to a bin. A bin within 0.2 % and half a bin of a multiple is a line if it is higher than its neighbours
-/// and at least 6 times as high as the highest of the 14 bins on either side beyond the window's own
-/// width. In noise that is even there, one transform does that with a chance of
-/// `∏ j/(j+6), j = 1…28` = 7·10⁻⁷ a bin (ratio of an exponential variable to the largest of 28), more
-/// transforms with less; in a comb of lines, as orders of a shaft or a multisine make them, or on a
-/// broad resonance, no bin does. Mains is said to be there if the fundamental is a line, or two of its
-/// multiples are, and the strongest has an amplitude of a thousandth of the record's rms.
+/// Welch's method with Hann windows of 2 s (at least 1 s), over which grids keep their frequency within a bin. A bin
+/// within 0.2 % and half a bin of a multiple is a line if it is higher than its neighbours and at least 6 times as
+/// high as the highest of the 14 bins on either side beyond the window's own width. For locally white noise, the
+/// false-alarm probability of one transform is `∏ j/(j+6), j = 1…28` = 7·10⁻⁷ per bin (ratio of an exponential
+/// variable to the largest of 28), less with several transforms; in a comb of lines, as from shaft orders or a
+/// multisine, or on a broad resonance, no bin passes. Mains is reported if the fundamental is a line, or two of its
+/// multiples are, and the strongest has an amplitude of at least a thousandth of the record's RMS.
 ///
-/// A line of another origin can lie at 50 Hz as well: a motor on mains, or a shaft at a whole part of
-/// it. In `seconds` of record it cannot be told from mains if it is closer than the resolution.
+/// A line of another origin can lie at 50 Hz as well: a mains-fed motor, or a shaft at a fraction of it. It cannot
+/// be distinguished from mains if it is closer than the resolution.
 ///
-/// The amplitude is `√(2 Σ(S − S₀) Δf)` over the 5 bins about the line, `S₀` being the median beside.
+/// The amplitude is `√(2 Σ(S − S₀) Δf)` over the 5 bins about the line, `S₀` being the median of the neighbouring
+/// bins.
 ///
 /// ```
 /// use torqcomp_dsp::quality::mains::mains;
@@ -105,7 +105,7 @@ pub fn mains(samples: &[f64], rate_hz: f64) -> Option<Mains> {
         if !told || strongest < least {
             continue;
         }
-        // Multiples of 300 Hz belong to both: lines that are no orders of a shaft decide, then the fundamental, then the
+        // Multiples of 300 Hz belong to both: lines that are not shaft orders decide, then the fundamental, then the
         // number of lines.
         let shaft_hz = shaft(&density, nominal_hz);
         let weight = lines.len() as f64
@@ -124,8 +124,8 @@ pub fn mains(samples: &[f64], rate_hz: f64) -> Option<Mains> {
     best.map(|(_, found)| found)
 }
 
-/// The lowest line at `p/q` of a mains frequency below twice of it, `q` from 2 to 6, of a shaft that may make a line at the
-/// mains frequency, too.
+/// The lowest line at `p/q` of a mains frequency below twice that frequency, `q` from 2 to 6, of a shaft that may also
+/// produce a line at the mains frequency.
 fn shaft(density: &Density, nominal_hz: f64) -> Option<f64> {
     let fractions = (2..=LARGEST_DENOMINATOR).flat_map(|q| (1..2 * q).map(move |p| (p, q)));
     let fractions = fractions.filter(|(p, q)| p % q != 0);
@@ -137,7 +137,8 @@ fn shaft(density: &Density, nominal_hz: f64) -> Option<f64> {
     lines.min().map(|bin| bin as f64 * density.step_hz)
 }
 
-/// Whether a line is one of the first orders of a shaft whose first three are lines, and of which the mains frequency is none.
+/// Whether a line is one of the first orders of a shaft that shows its first three orders, none of them at the mains
+/// frequency.
 fn is_of_another_shaft(density: &Density, nominal_hz: f64, line_hz: f64) -> bool {
     (1..=SHAFT_ORDERS).any(|order| {
         let shaft_hz = line_hz / order as f64;
@@ -176,7 +177,7 @@ fn spectrum(samples: &[f64], rate_hz: f64) -> Option<(Density, f64, f64)> {
     Some((density, (square - mean * mean).max(0.0), square))
 }
 
-/// The line at a multiple of a mains frequency, if there is one.
+/// The line at a multiple of a mains frequency, if any.
 fn line(density: &Density, nominal_hz: f64, order: usize) -> Option<MainsLine> {
     let bin = peak(density, nominal_hz * order as f64)?;
     let mut beside = beside(density, bin)?;
@@ -194,7 +195,7 @@ fn line(density: &Density, nominal_hz: f64, order: usize) -> Option<MainsLine> {
     })
 }
 
-/// The bin near a frequency that stands out of those beside it.
+/// The bin near a frequency that exceeds its neighbours.
 fn peak(density: &Density, frequency_hz: f64) -> Option<usize> {
     let off = 0.5 * density.step_hz + OFF * frequency_hz;
     let first = ((frequency_hz - off) / density.step_hz).ceil().max(1.0) as usize;
@@ -208,7 +209,7 @@ fn peak(density: &Density, frequency_hz: f64) -> Option<usize> {
     (is_top && values[bin] > 0.0 && values[bin] >= PROMINENCE * highest).then_some(bin)
 }
 
-/// Densities on both sides of a line, beyond its own width; `None` where there are too few.
+/// Densities on both sides of a line, beyond its own width; `None` if there are too few.
 fn beside(density: &Density, bin: usize) -> Option<Vec<f64>> {
     let left = bin.checked_sub(LOBE + BESIDE)?;
     let right = density.values.get(bin + LOBE + 1..=bin + LOBE + BESIDE)?;
@@ -237,7 +238,7 @@ mod tests {
             sum(&comb, &tone(1.0, 5.0 * f64::from(order), 2000.0, 20_000))
         });
         assert_eq!(mains(&comb, 2000.0), None);
-        // A ring-down at 50 Hz with a damping ratio of 0.01.
+        // A decay at 50 Hz with a damping ratio of 0.01.
         let ring: Vec<f64> = tone(1.0, 50.0, 2000.0, 20_000)
             .iter()
             .enumerate()
@@ -269,7 +270,8 @@ mod tests {
         assert_eq!(found.shaft_hz, Some(25.0));
     }
 
-    /// 50 Hz is no order of a shaft at 30 Hz that shows its own, nor 60 Hz one at 25 Hz.
+    /// 50 Hz is not an order of a shaft at 30 Hz that shows its own orders, nor is 60 Hz one at 25
+    /// Hz.
     #[test]
     fn hum_beside_the_orders_of_a_shaft_is_found() {
         for (shaft, mains_hz, rate_hz) in [(30.0, 50.0, 1000.0), (25.0, 60.0, 2000.0)] {

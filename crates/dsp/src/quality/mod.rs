@@ -1,23 +1,23 @@
-//! What is wrong with a recording: faults that its samples and time stamps show by themselves.
+//! Faults of a recording that its samples and time stamps show by themselves.
 //!
-//! Each file has one criterion, what it rests on and how often it would be wrong on good data. All
-//! take plain slices; a sample that is not a number (`NaN`) belongs to no run, no level and no line.
+//! Each file has one criterion, with its assumptions and its false-alarm rate on good data. All take plain slices;
+//! `NaN` belongs to no run, level or line.
 //!
 //! | fault | where |
 //! |---|---|
 //! | jitter, gaps, time running backwards, repeated stamps, clock jumps | [`steps`](mod@steps) |
-//! | stamps that are rounded | [`rounding`], with samples missing [`broken_line`] |
-//! | a stated rate that the stamps contradict | [`rate`] |
-//! | cells that are no finite numbers | [`finite`] |
+//! | rounded stamps | [`rounding`], with missing samples [`broken_line`] |
+//! | a stated rate that contradicts the stamps | [`rate`] |
+//! | non-finite cells | [`finite`] |
 //! | clipping | [`clipping`](mod@clipping), under noise [`pile_up`](mod@pile_up), of a decay before a filter [`flat_tops`](mod@flat_tops) |
-//! | a channel that stands still | [`stuck`] |
-//! | samples that stand alone | [`spikes`](mod@spikes) |
-//! | these three in a stream | [`streamed`] |
-//! | samples that repeat the one before | [`repeats`](mod@repeats) |
+//! | a stuck channel | [`stuck`] |
+//! | isolated outliers | [`spikes`](mod@spikes) |
+//! | the last three in a stream | [`streamed`] |
+//! | repeated samples | [`repeats`](mod@repeats) |
 //! | coarse resolution | [`quantisation`](mod@quantisation) |
 //! | mains hum | [`mains`](mod@mains) |
 //! | a resonance other than the declared one | [`resonance`] |
-//! | number, range, mean and spread of samples that are not kept | [`sums`] |
+//! | number, range, mean and standard deviation of a stream | [`sums`] |
 //! | channels that are copies of each other | [`copies`](mod@copies) |
 
 pub mod broken_line;
@@ -61,11 +61,11 @@ pub fn range(samples: &[f64]) -> Option<(f64, f64)> {
     (low <= high).then_some((low, high))
 }
 
-/// Distance from a straight line, as a part of the range, within which a channel is one.
+/// Relative distance from a straight line within which a channel counts as one.
 const STRAIGHT: f64 = 1e-3;
 
 /// Whether all samples lie within a thousandth of the range of the line through the first and the
-/// last: a counter, a time axis, a constant. Not if one of them is no number.
+/// last: a counter, a time axis, a constant. False if any sample is NaN.
 ///
 /// ```
 /// use torqcomp_dsp::quality::is_straight;
@@ -83,11 +83,11 @@ pub fn is_straight(samples: &[f64]) -> bool {
     samples.all(|(i, x)| (x - first - slope * i as f64).abs() <= near)
 }
 
-/// Blocks that are looked at in a long record, and samples of each.
+/// Number of blocks examined in a long record, and samples of each.
 const BLOCKS: usize = 32;
 const BLOCK_LENGTH: usize = 4096;
 
-/// The samples, or blocks evenly spread over them where there are very many.
+/// All samples, or evenly spread blocks of a long record.
 fn excerpts(samples: &[f64]) -> Vec<&[f64]> {
     if samples.len() <= BLOCKS * BLOCK_LENGTH {
         return vec![samples];
@@ -99,7 +99,7 @@ fn excerpts(samples: &[f64]) -> Vec<&[f64]> {
         .collect()
 }
 
-/// Middle value of a set (the upper one of two); `None` if it is empty.
+/// Median of a set (the upper one of two); `None` if it is empty.
 ///
 /// ```
 /// assert_eq!(torqcomp_dsp::quality::median(&mut [3.0, 1.0, 9.0, 2.0]), Some(3.0));

@@ -1,33 +1,34 @@
-//! Clipping before noise is added: samples pile up at a level, but no two of them need be equal.
+//! Clipping before noise is added: samples pile up at a level without being equal.
 
 use super::clipping::{Clipping, ROUNDING, Rail, goes_beyond};
 use super::runs::Lengths;
 use super::{Run, range, runs};
 
-/// Parts of the range whose highest, or lowest, is looked at: the noise of the level lies within it.
+/// Number of parts of the range; the noise on the level must lie within the outermost one.
 const PARTS: [f64; 2] = [256.0, 64.0];
-/// Samples in the outermost part, over those in the next one, that are a pile: the peak of a sine has 2.4 times as many.
+/// Ratio of the samples in the outermost part to those in the next one that makes a pile-up: 2.4 for the peak of a
+/// sine.
 const PILE: usize = 4;
-/// Least part of all samples in a pile.
+/// Minimum fraction of all samples in a pile-up.
 const LEAST: f64 = 0.01;
-/// Part of all samples at both ends from which a signal rests or switches there.
+/// Fraction of all samples at both ends above which a signal rests or switches there.
 const RESTING: f64 = 0.6;
-/// Fewest runs in the outermost part that are cut-off peaks: one or two can be steps of the signal.
+/// Minimum number of clipped peaks in the outermost part: one or two can be steps of the signal.
 const FEWEST: usize = 3;
-/// Part of these runs that must be cut off.
+/// Minimum fraction of these runs that must be clipped.
 const CUT: f64 = 1.0 / 3.0;
-/// Fewest samples of a cut-off peak.
+/// Minimum number of samples of a clipped peak.
 const SHORTEST: usize = 3;
 
-/// Tells whether a signal was cut off at a level before a little noise came to it.
+/// Detects clipping of a signal at a level before a little noise was added to it.
 ///
-/// The range is divided into 256 parts (64, if the noise is larger). Its outermost part holds a cut-off level if
-/// 1. it has more than 4 times the samples of the part next to it, and 1 % of all: of a sine of amplitude `A`,
-///    `arccos(1 − w/A)/π` lie within `w` of the peak, 2.4 times as many as in the next `w`;
-/// 2. at least 3 runs of samples in it are longer than twice 95 % of the runs in other parts, and none of those is as long
-///    as the longest: a signal that rests at several levels is not cut off at the last of them;
-/// 3. one in three of these runs is both entered and left in full motion, as [`clipping`](fn@super::clipping::clipping)
-///    tells it with 4 parts as tolerance.
+/// The range is divided into 256 parts (64, if the noise is larger). Its outermost part contains a clipping level if
+/// 1. it has more than 4 times the samples of the adjacent part, and 1 % of all: of a sine of amplitude `A`, a fraction
+///    `arccos(1 − w/A)/π` lies within `w` of the peak, 2.4 times as many as in the next `w`;
+/// 2. at least 3 runs of samples in it are longer than twice the 95th percentile of the runs in other parts, and none
+///    of those is as long as the longest: a signal that rests at several levels is not clipped at the last of them;
+/// 3. one in three of these runs is both entered and left in full motion, by the criterion of
+///    [`clipping`](fn@super::clipping::clipping) with a tolerance of 4 parts.
 ///
 /// A signal with more than 60 % of its samples in both outermost parts rests or switches there and is not judged.
 ///
@@ -54,11 +55,11 @@ pub fn pile_up(samples: &[f64]) -> Option<Clipping> {
     })
 }
 
-/// The rail at the second end of a range, which is divided into parts of so much.
+/// The rail at the second end of a range divided into parts of this width.
 fn rail(samples: &[f64], [far, extreme]: [f64; 2], width: f64) -> Option<Rail> {
     let sign = (extreme - far).signum();
     let last = ((extreme - far).abs() / width).round() - 1.0;
-    // Parts below the extreme one, each sample in the middle of its own.
+    // Parts below the extreme one, with each sample in the middle of its part.
     let part = |x: &f64| ((extreme - x) * sign / width).floor();
     let level = |x: &f64| {
         let part = part(x);
@@ -113,7 +114,7 @@ mod tests {
         sum(values, &noise)
     }
 
-    /// Response of a stand (damping ratio, steps of its period) to a torque, by its difference equation.
+    /// Response of a stand (damping ratio, samples per period) to a torque, by its difference equation.
     fn answered(torque: &[f64], damping_ratio: f64, period: f64) -> Vec<f64> {
         let w = std::f64::consts::TAU / period;
         let (mut y, mut v) = (torque[0], 0.0);

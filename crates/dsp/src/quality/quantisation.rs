@@ -1,45 +1,46 @@
-//! The step that a channel's values are multiples of.
+//! Quantisation step of a channel.
 
 use super::{excerpts, range};
 
-/// Candidates for the step: these parts of the distances between neighbouring levels are smaller.
+/// Candidates for the step: fractions of the distances between neighbouring levels that are
+/// smaller.
 const CANDIDATES: [f64; 4] = [0.0, 0.02, 0.1, 0.5];
-/// Distances of more steps than this do not count: an error of the step adds up in them.
+/// Longest distance used, in steps, as the error of the step accumulates.
 const MOST_STEPS: f64 = 20.0;
-/// Largest distance from a whole number of steps, in steps.
+/// Largest deviation from a whole number of steps, in steps.
 const OFF: f64 = 0.12;
-/// Part of the distances that must lie so close.
+/// Minimum fraction of the distances within that deviation.
 const PART: f64 = 0.99;
-/// Distances that are evidence although they are only near.
+/// Minimum number of distances for evidence with that deviation.
 const ENOUGH: usize = 8;
-/// The same where there are fewer.
+/// Deviation with fewer distances.
 const EXACT: f64 = 1e-4;
-/// Relative difference below which two values are one.
+/// Relative difference below which two values are equal.
 const SAME: f64 = 1e-9;
 
-/// How finely a channel is resolved.
+/// Resolution of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantisation {
     /// The step, in the channel's unit.
     pub step: f64,
-    /// Levels from the smallest to the largest sample, used or not.
+    /// Number of levels from the smallest to the largest sample, used or not.
     pub levels: f64,
-    /// `log2(levels)`: bits over the range used.
+    /// `log2(levels)`: effective bits over the range used.
     pub bits: f64,
-    /// Levels that occur (in the excerpts of a long record).
+    /// Number of levels that occur (in the excerpts of a long record).
     pub seen: usize,
 }
 
-/// Finds the step `q` that all values are multiples of, apart from one offset; `None` if the channel
-/// is constant or so finely resolved that no step can be seen.
+/// Finds the step `q` of which all values are multiples, apart from a common offset; `None` if the
+/// channel is constant or too finely resolved to show a step.
 ///
 /// The levels that occur are sorted; each distance `d` of neighbours is `round(d/q)` steps. A `q` is
-/// believed if 99 % of the distances up to 20 steps, and these are at least half of all, lie within
+/// accepted if 99 % of the distances up to 20 steps, which must be at least half of all, lie within
 /// 0.12 steps of a whole number (text and floating point round the levels). For values that are not
-/// on any grid, a distance passes with a chance of 0.24, so eight of them with 10⁻⁵, and there are
-/// usually hundreds. With fewer levels than nine, distances must be exact to 10⁻⁴.
+/// on a grid, a distance passes with a probability of 0.24, so eight of them with 10⁻⁵, and there
+/// are usually hundreds. With fewer than nine levels, distances must be exact to 10⁻⁴.
 ///
-/// Long records are looked at in 32 evenly spread excerpts of 4096 samples.
+/// Long records are examined in 32 evenly spread excerpts of 4096 samples.
 ///
 /// ```
 /// use torqcomp_dsp::quality::quantisation::quantisation;
@@ -71,7 +72,7 @@ pub fn quantisation(samples: &[f64]) -> Option<Quantisation> {
     })
 }
 
-/// The values that occur, rising; those closer than `same` are one.
+/// The values that occur, ascending; those closer than `same` are merged.
 fn levels(samples: &[f64], same: f64) -> Vec<f64> {
     let parts = excerpts(samples);
     let finite = parts.iter().copied().flatten().filter(|x| x.is_finite());
@@ -81,11 +82,11 @@ fn levels(samples: &[f64], same: f64) -> Vec<f64> {
     values
 }
 
-/// A step near a first guess that the distances, which rise, are multiples of.
+/// A step near an initial guess of which the distances, in ascending order, are multiples.
 fn refined(distances: &[f64], guess: f64) -> Option<f64> {
     let mut step = guess;
     for _ in 0..3 {
-        // They rise.
+        // They are ascending.
         let usable = distances.partition_point(|d| *d < MOST_STEPS * step);
         let (sum, count) = distances[..usable]
             .iter()

@@ -1,26 +1,26 @@
-//! A stated sampling rate that the time stamps contradict.
+//! A stated sampling rate that contradicts the time stamps.
 
-/// Deviation that a recorder's clock and its stated rate may have, as a fraction: ten times what
-/// quartz does, a tenth of what would move a resonance noticeably.
+/// Relative tolerance between a recorder's clock and its stated rate: ten times that of quartz, a
+/// tenth of what would shift a resonance noticeably.
 const TOLERANCE: f64 = 1e-3;
-/// Digits beyond which the text of a rate is the rounding of its reciprocal.
+/// Number of digits above which a rate was computed as a reciprocal and rounded.
 const DIGITS: usize = 12;
 
-/// A rate in the head of a file and the one of the stamps.
+/// Rate stated in the header of a file and rate from its stamps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contradiction {
-    /// What the head of the file says, Hz.
+    /// Rate in the header, Hz.
     pub stated_hz: f64,
-    /// What the stamps say, Hz.
+    /// Rate from the stamps, Hz.
     pub stamped_hz: f64,
 }
 
-/// Compares a stated rate with the one of `count` stamps.
+/// Compares a stated rate with that of `count` stamps.
 ///
 /// They contradict each other if `|stated/stamped − 1|` exceeds the sum of 0.1 % (clocks), half a
-/// unit of the last digit that the rate or its reciprocal is stated with (0.667 ms is 1499.25 Hz
-/// ± 0.075 %), and one step in the length of the record (stamps that are rounded). Two quartz clocks
-/// differ by less than 0.02 %, so that clocks alone never raise an alarm.
+/// unit of the last stated digit of the rate or its reciprocal (0.667 ms is 1499.25 Hz ± 0.075 %),
+/// and one step over the length of the record (rounded stamps). Two quartz clocks differ by less
+/// than 0.02 %, so clocks alone never raise an alarm.
 ///
 /// ```
 /// use torqcomp_dsp::quality::rate::contradiction;
@@ -30,7 +30,7 @@ pub struct Contradiction {
 /// ```
 #[must_use]
 pub fn contradiction(stated_hz: f64, stamped_hz: f64, count: usize) -> Option<Contradiction> {
-    // A whole number of Hz is meant exactly: 5 kHz is not 5000 ± 500 Hz.
+    // A whole number of Hz is exact: 5 kHz is not 5000 ± 500 Hz.
     let written = if (stated_hz - stated_hz.round()).abs() < 1e-9 * stated_hz {
         0.0
     } else {
@@ -44,7 +44,8 @@ pub fn contradiction(stated_hz: f64, stamped_hz: f64, count: usize) -> Option<Co
     })
 }
 
-/// Half a unit of the last decimal digit of a number, over the number; 0 if it has very many.
+/// Half a unit of the last decimal digit of a number, relative to it; 0 for a number of very many
+/// digits.
 fn half_unit(value: f64) -> f64 {
     let text = format!("{:.*e}", DIGITS - 1, value);
     let mantissa = text.split('e').next().unwrap_or_default();

@@ -1,50 +1,49 @@
-//! Samples that repeat the one before.
+//! Detection of repeated samples.
 
 use super::runs::Lengths;
 use super::{excerpts, median, range, runs};
 
-/// Bins up to the median step in which steps are counted.
+/// Number of bins up to the median step for the histogram of steps.
 const BINS: usize = 64;
-/// Fewest steps from which the bins can be judged.
+/// Minimum number of steps for the bins to be judged.
 const FEWEST: usize = 400;
-/// Part of the bins that is filled if the resolution is finer than two of them.
+/// Fraction of filled bins if the resolution is finer than two of them.
 const FILLED: f64 = 0.5;
-/// Repeats, over what the resolution explains at most, from which there are too many.
+/// Ratio of repeats to the maximum explained by the resolution above which there are too many.
 const EXCESS: f64 = 3.0;
-/// Part of the values that must be repeats before it is worth saying.
+/// Minimum fraction of repeated values worth reporting.
 const PART: f64 = 0.05;
-/// Part of the runs that must be whole multiples of a hold.
+/// Minimum fraction of runs that are whole multiples of a hold.
 const WHOLE: f64 = 0.98;
-/// Longest hold that is looked for.
+/// Longest hold searched for.
 const LONGEST_HOLD: usize = 100;
-/// Fewest runs from which a hold is told.
+/// Minimum number of runs to detect a hold.
 const FEWEST_RUNS: usize = 30;
 
-/// How often samples repeat the one before, and whether they should.
+/// Frequency of repeated samples, and whether the resolution explains them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Repeats {
-    /// Part of all samples but the first that equal the one before.
+    /// Fraction of all samples but the first that equal the preceding one.
     pub fraction: f64,
-    /// Whether that is more than the channel's resolution explains; `None` if it cannot be told.
+    /// Whether that exceeds what the channel's resolution explains; `None` if unknown.
     pub unexplained: Option<bool>,
-    /// Number of samples that every value is held for, if it is one number.
+    /// Number of samples for which every value is held, if it is constant.
     pub hold: Option<usize>,
-    /// Values over samples: the rate at which new values come, over the sampling rate.
+    /// Values per sample: the rate of new values relative to the sampling rate.
     pub fresh: f64,
 }
 
-/// Counts samples that equal the one before, and tells whether the resolution explains them; `None`
-/// for fewer than two numbers or a constant channel.
+/// Counts samples that equal the preceding one, and tests whether the resolution explains them;
+/// `None` for fewer than two numbers or a constant channel.
 ///
-/// A signal that moves by many resolution steps from one sample to the next hits the same value again
-/// about as often as any other value near it. Let `d` be the median of the steps between different
-/// values. If the sizes of the steps fill half of 64 bins between 0 and `d`, the resolution is finer
-/// than `d/32`; then repeats are expected no more often than steps of up to `d/16`. Three times that
-/// (and five standard deviations of a count more, and 5 % of all values) are not explained. Values
-/// are counted, not samples: a standstill, however long, is one value. Where the bins stay empty, the
-/// resolution is coarse and nothing is claimed, unless 98 % of the values are held for a multiple of
-/// the same number `k ≥ 2` of samples; by chance that would be one in `k`, so that with 30 values it
-/// never happens.
+/// A signal that moves by many resolution steps per sample hits the same value again about as often
+/// as any other value near it. Let `d` be the median of the steps between different values. If the
+/// step sizes fill half of 64 bins between 0 and `d`, the resolution is finer than `d/32`; repeats
+/// are then expected no more often than steps of up to `d/16`. More than three times that (plus five
+/// standard deviations of a count, and 5 % of all values) are unexplained. Values are counted, not
+/// samples: a standstill, however long, is one value. Where the bins stay empty, the resolution is
+/// coarse and nothing is concluded, unless 98 % of the values are held for a multiple of the same
+/// number `k ≥ 2` of samples; by chance that would be one in `k`, so with 30 values it never happens.
 ///
 /// ```
 /// use torqcomp_dsp::quality::repeats::repeats;
@@ -60,7 +59,7 @@ pub fn repeats(samples: &[f64]) -> Option<Repeats> {
     let numbers = samples.iter().filter(|x| !x.is_nan()).count();
     let all = Lengths::of(runs(samples));
     let fresh = all.total() as f64 / numbers as f64;
-    // Values at the ends may be clipped, and the first and last are held for longer than is seen.
+    // Values at the ends may be clipped, and the first and last run are truncated.
     let inner = |r: &super::Run| r.value != low && r.value != high && r.start > 0;
     let lengths = Lengths::of(runs(samples).filter(|r| inner(r) && r.end() < samples.len()));
     let hold = hold(&lengths);
@@ -75,14 +74,14 @@ pub fn repeats(samples: &[f64]) -> Option<Repeats> {
     })
 }
 
-/// The number of samples that every value is held for a multiple of, if there is one above 1.
+/// The number of samples above 1 of which the length of nearly every run is a multiple, if any.
 fn hold(lengths: &Lengths) -> Option<usize> {
     let total = lengths.total();
     if total < FEWEST_RUNS {
         return None;
     }
     let whole = |k: usize| lengths.count(|l| l > 0 && l % k == 0) as f64 >= WHOLE * total as f64;
-    // Most values are held once: the hold is the most frequent length.
+    // Most values are held once, so the hold is the most frequent length.
     (2..=LONGEST_HOLD)
         .rev()
         .find(|k| 2 * lengths.count(|l| l == *k) > total && whole(*k))
@@ -151,7 +150,7 @@ mod tests {
 
     #[test]
     fn a_part_of_samples_repeated_at_random_is_found() {
-        // 30 % of the samples repeat the one before, in five-digit text.
+        // 30 % of the samples repeat the preceding one, in five-digit text.
         let fresh = noise(9, 20_000);
         let chance = noise(10, 20_000);
         let mut record = vec![fresh[0]];

@@ -1,46 +1,47 @@
-//! A resonance that a record shows where none is declared.
+//! A resonance in a record where none is declared.
 
 use crate::spectrum::{Density, welch};
 
-/// A resonance as the spectrum of a record shows it.
+/// A resonance in the spectrum of a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resonance {
     /// Frequency of the peak in Hz.
     pub frequency_hz: f64,
-    /// Damping ratio by the width of the peak at half its power: `Δf/(2 f)`.
+    /// Damping ratio from the half-power bandwidth: `Δf/(2 f)`.
     pub damping_ratio: f64,
 }
 
 /// Largest damping ratio of a mode that must show a peak.
 const SHARP: f64 = 0.15;
-/// Frequencies that are looked at, over the declared one.
+/// Frequency range examined, relative to the declared frequency.
 const NEAR: [f64; 2] = [0.4, 2.5];
-/// Fewest blocks that are averaged, half overlapping ones counted.
+/// Minimum number of averaged blocks, counting half-overlapping ones.
 const BLOCKS: usize = 7;
-/// Block lengths that are tried, each half of the one before; the longest resolves a sixteenth of the declared width.
+/// Number of block lengths, each half of the previous one; the longest resolves a sixteenth of the declared width.
 const RESOLUTIONS: u32 = 4;
-/// Least width of a peak at half its power, in steps of the spectrum: a line of a Hann window has 1.4.
+/// Minimum half-power bandwidth, in steps of the spectrum: a line with a Hann window has 1.4.
 const BROAD: f64 = 4.0;
-/// Largest width of a peak, as a part of its frequency.
+/// Maximum half-power bandwidth, relative to the frequency.
 const WIDEST: f64 = 0.2;
-/// Least power of a peak over the median of the spectrum.
+/// Minimum power of a peak relative to the median of the spectrum.
 const STRONG: f64 = 30.0;
-/// Power of a resonance at one and two widths from its peak is 1/5 and 1/17; what is still taken for it.
+/// Distances from the peak in bandwidths, and accepted ranges of the relative power; a resonance has 1/5
+/// and 1/17.
 const SKIRT: [(f64, [f64; 2]); 2] = [(1.0, [0.1, 0.4]), (2.0, [0.02, 0.17])];
-/// Largest power at the declared frequency, over that at some widths to either side, that is no peak; a mode would have 17 times
-/// as much.
+/// Largest power at the declared frequency, relative to that some widths to either side, that is not a peak; a mode
+/// would have 17 times as much.
 const NO_PEAK: f64 = 2.5;
-/// Declared half widths from a mode at which its power has fallen to 1/17.
+/// Distance from a mode, in declared half-widths, at which its power has fallen to 1/17.
 const ASIDE: f64 = 4.0;
 
-/// The resonance that a record shows in the neighbourhood of the first of several declared modes (natural frequency in Hz and
-/// damping ratio), if it shows none there.
+/// The resonance of a record near the first of several declared modes (natural frequency in Hz and damping ratio), if
+/// the record shows none at that mode.
 ///
-/// The power near a resonance falls as `1/(1 + (2 Δ/w)²)` at a distance `Δ`, with the width `w = 2 ζ f` at half the
-/// power. A peak is taken for a resonance if it is at least four steps of the spectrum wide (a steady line is
-/// narrower), 30 times as strong as the median of the spectrum, and falls off on both sides as that law says (an order
-/// that sweeps with the speed ends abruptly). It must lie off all declared modes by its width and 5 %, while
-/// the spectrum has no peak at the first of them.
+/// The power near a resonance falls as `1/(1 + (2 Δ/w)²)` at a distance `Δ`, with the half-power bandwidth `w = 2 ζ f`.
+/// A peak is a resonance if it is at least four steps of the spectrum wide (a steady line is narrower), 30 times as
+/// strong as the median of the spectrum, and falls off on both sides by that law (an order swept with the speed ends
+/// abruptly). It must be away from all declared modes by its width and 5 %, while the spectrum has no peak at the first
+/// of them.
 ///
 /// ```
 /// use torqcomp_dsp::quality::resonance::other_resonance;
@@ -64,7 +65,7 @@ pub fn other_resonance(
         return None;
     }
     let longest = (2 * samples.len() / (BLOCKS + 1)).checked_ilog2()?;
-    // Sharp peaks need long blocks; those of broad ones scatter less in short ones.
+    // Sharp peaks need long blocks; broad ones have less variance with short blocks.
     let finest = (16.0 * rate_hz / (2.0 * ratio * declared_hz)).log2().ceil() as u32;
     let powers = (finest.saturating_sub(RESOLUTIONS - 1)..=finest).rev();
     powers.filter(|power| *power <= longest).find_map(|power| {
@@ -91,7 +92,7 @@ fn in_spectrum(
     (declared.iter().all(is_off) && is_missing).then_some(found)
 }
 
-/// A spectrum averaged over three frequencies each.
+/// A spectrum averaged over three adjacent frequencies.
 struct Smooth {
     step_hz: f64,
     values: Vec<f64>,
@@ -115,7 +116,7 @@ impl Smooth {
         }
     }
 
-    /// Place of a frequency; the first average is about the second one.
+    /// Index of a frequency; the first average is centred on the second one.
     fn place(&self, hz: f64) -> usize {
         ((hz / self.step_hz).round() as usize).saturating_sub(1)
     }
@@ -126,7 +127,7 @@ impl Smooth {
         Some(part.iter().sum::<f64>() / part.len() as f64)
     }
 
-    /// The strongest peak in a range, if it is that of a resonance.
+    /// The strongest peak in a range, if it is a resonance.
     fn resonance(&self, from_hz: f64, to_hz: f64) -> Option<Resonance> {
         let range = self.place(from_hz)..=self.place(to_hz);
         let best = range.max_by(|a, b| self.values[*a].total_cmp(&self.values[*b]))?;
@@ -154,7 +155,7 @@ impl Smooth {
         })
     }
 
-    /// Whether no peak of a half width lies at a frequency.
+    /// Whether there is no peak of a given half-width at a frequency.
     fn has_no_peak(&self, hz: f64, half_hz: f64) -> bool {
         let aside_hz = ASIDE * half_hz;
         let sides = [-1.0, 1.0].map(|side| {
@@ -176,7 +177,7 @@ mod tests {
     use super::super::testing::{noise, sine, sum};
     use super::*;
 
-    /// The answer of a resonance to an input, by the exact recursion of its free motion.
+    /// The response of a resonance to an input, by the exact recursion of its free motion.
     fn rung(input: &[f64], rate_hz: f64, hz: f64, ratio: f64) -> Vec<f64> {
         let omega = TAU * hz / rate_hz;
         let (decay, cos) = (
@@ -222,7 +223,7 @@ mod tests {
         let white = noise(7, count);
         let modes = [(450.0, 0.02)];
         let line = sum(&sine(40.0, 20_000.0 / 590.0, count), &white);
-        // A speed that wavers, and one that rises.
+        // A fluctuating speed, and a rising one.
         let phase = |i: usize| {
             let t = i as f64 / 20_000.0;
             (

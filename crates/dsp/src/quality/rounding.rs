@@ -1,24 +1,25 @@
-//! Time stamps that are uniform but for being rounded.
+//! Uniform time stamps that are rounded.
 
 use std::ops::RangeInclusive;
 
-/// A uniform time axis whose stamps are rounded to a coarse step.
+/// A uniform time axis with coarsely rounded stamps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rounded {
-    /// Step of the samples: of those that explain all stamps, one near the middle that is said in the
-    /// fewest digits, as a step or as a rate.
+    /// Time step: among those that explain all stamps, one near the middle with the fewest digits, as
+    /// a step or as a rate.
     pub step_s: f64,
-    /// Least and largest step that explain all stamps; both the slope of the straight line where none
-    /// explains them to the last digit.
+    /// Smallest and largest step that explain all stamps; both are the slope of the fitted line if
+    /// none explains them exactly.
     pub steps_s: [f64; 2],
-    /// What the stamps are multiples of.
+    /// Quantum of the stamps: all are multiples of it.
     pub quantum_s: f64,
     /// Largest distance of a stamp from the line.
     pub farthest_s: f64,
 }
 
 impl Rounded {
-    /// Least and largest step in s that stamps over a span in s allow: `b (1 ± q/span)` where no two steps bound them.
+    /// Smallest and largest step in s allowed by the stamps over a span in s: `b (1 ± q/span)` where no two steps
+    /// bound them.
     ///
     /// ```
     /// use torqcomp_dsp::quality::rounding::rounded;
@@ -38,27 +39,27 @@ impl Rounded {
     }
 }
 
-/// Fewest stamps that a line is laid through.
+/// Minimum number of stamps for a line.
 pub(super) const FEWEST: usize = 8;
-/// Least quantum, as a part of the step, that is worth saying: below it, steps stay within 1 %.
+/// Minimum quantum relative to the step; below it, steps stay within 1 %.
 const COARSE: f64 = 0.01;
-/// Largest distance of a stamp from the line, in quanta, at which the stamps are the line.
+/// Largest distance of a stamp from the line, in quanta, at which the stamps are exact.
 const EXACT: f64 = 0.05;
-/// Largest distance of a stamp from the line, in quanta: half, and as much as the line can be off.
+/// Largest distance of a stamp from the line, in quanta: half, plus the uncertainty of the line.
 const HALF: f64 = 0.6;
 
-/// Tells whether stamps (in s, rising or repeated) are a straight line rounded to multiples of a
-/// quantum `q`: `|tᵢ − (a + b i)| ≤ 0.6 q` for all of them, with `a`, `b` by least squares.
+/// Tests whether stamps (in s, non-decreasing) are a straight line rounded to multiples of a quantum `q`:
+/// `|tᵢ − (a + b i)| ≤ 0.6 q` for all of them, with `a`, `b` by least squares.
 ///
-/// Rounding or truncation of a uniform axis leaves at most `q/2` on either side of the line. `q` is
-/// the power of ten that all stamps are multiples of, since stamps are rounded when they are
-/// written as text. Jitter below `q/2` cannot be told from rounding; it is then just as harmless.
-/// Stamps that fall are none of a rounded axis. Random jitter passes only if it stays within the quantum everywhere, so a clock that wanders by
-/// more than the last digit it is written with is never taken for rounded.
+/// Rounding or truncation of a uniform axis leaves at most `q/2` on either side of the line. `q` is the power of ten of
+/// which all stamps are multiples, since stamps are rounded when written as text. Jitter below `q/2` cannot be
+/// distinguished from rounding, but is equally harmless. Decreasing stamps are not a rounded axis. Random jitter passes
+/// only if it stays within the quantum everywhere, so a clock that drifts by more than its last written digit is never
+/// accepted as rounded.
 ///
-/// The slope of the line by least squares is too flat: through `n` steps of a staircase by the factor
-/// `1 − 1/n²`. So the step is taken from all the lines `a + b i` that stay within one quantum above each
-/// stamp, `tᵢ ≤ a + b i ≤ tᵢ + q` (rounding instead of truncation only moves `a`): these are the `b` with
+/// The slope of the least-squares line is too flat, through `n` steps of a staircase by the factor `1 − 1/n²`. So the
+/// step is taken from all lines `a + b i` that stay within one quantum above each stamp, `tᵢ ≤ a + b i ≤ tᵢ + q`
+/// (rounding instead of truncation only changes `a`): these are the `b` with
 /// `(tⱼ − tᵢ − q)/(j − i) ≤ b ≤ (tⱼ − tᵢ + q)/(j − i)` for all `i < j`.
 ///
 /// ```
@@ -76,17 +77,18 @@ const HALF: f64 = 0.6;
 #[must_use]
 pub fn rounded(stamps_s: &[f64]) -> Option<Rounded> {
     let line = uniform_line(stamps_s.iter().copied().enumerate(), 0.0)?;
-    // An axis that needs no excuse is not given one.
+    // A uniform axis does not need rounding as an explanation.
     let needs_it =
         line.quantum_s > COARSE * line.step_s && line.farthest_s > 0.5 * COARSE * line.step_s;
     needs_it.then_some(line)
 }
 
-/// The straight line through stamps (each with its index, both rising or repeated), if these deviate from a line by no
-/// more than their rounding: `|tᵢ − (a + b i)| ≤ 0.6 q`, `q` being the power of ten up to 1 that all stamps are multiples of, or
-/// that the last and longest of them are, or `resolution_s`, the last bit of a clock, or a power of ten above 1.
+/// The straight line through stamps (each with its index, both non-decreasing), if these deviate from a line by no more
+/// than their rounding: `|tᵢ − (a + b i)| ≤ 0.6 q`, `q` being the power of ten up to 1 of which all stamps are
+/// multiples, or the last and longest of them are, or `resolution_s`, the last bit of a clock, or a power of ten above
+/// 1.
 ///
-/// The step of stamps that lie on the line exactly is theirs; else it is taken as [`rounded`] does.
+/// The step of stamps exactly on the line is that of the line; otherwise it is chosen as in [`rounded`].
 ///
 /// ```
 /// use torqcomp_dsp::quality::rounding::uniform_line;
@@ -149,7 +151,7 @@ pub fn uniform_line(
     })
 }
 
-/// Slope of the straight line through stamps by least squares, and the largest distance of a stamp from it.
+/// Least-squares slope of the line through stamps, and the largest distance of a stamp from it.
 fn fitted(
     stamps: impl Iterator<Item = (usize, f64)> + Clone,
     count: f64,
@@ -170,7 +172,7 @@ fn fitted(
     )
 }
 
-/// A multiple without the rounding of a quotient.
+/// A multiple, corrected for the rounding error of a quotient.
 fn whole(multiple: f64) -> f64 {
     let whole = multiple.round();
     if (multiple - whole).abs() < 1e-3 {
@@ -180,18 +182,19 @@ fn whole(multiple: f64) -> f64 {
     }
 }
 
-/// Least and largest step of the lines that stay within one above each stamp (index and stamp, counted from the first),
-/// if there are any and all of them rise.
+/// Smallest and largest step of the lines that stay within one above each stamp (index and stamp, relative to the
+/// first), if there are any and all of them rise.
 fn explaining(points: &[(f64, f64)]) -> Option<[f64; 2]> {
     slopes(points, [f64::NEG_INFINITY, f64::INFINITY])
         .filter(|[low, high]| *low > 0.0 && low < high)
 }
 
-/// Least and largest slope within a range of the lines that stay within one above each of several points.
+/// Smallest and largest slope within a range of the lines that stay within one above each of several
+/// points.
 pub(super) fn slopes(points: &[(f64, f64)], [low, high]: [f64; 2]) -> Option<[f64; 2]> {
     let (first, last) = (points.first()?, points.last()?);
     let steps = last.0 - first.0;
-    // The first and the last point allow no more than these.
+    // Bounds from the first and the last point.
     let outermost = [-1.0, 1.0].map(|one| (last.1 - first.1 + one) / steps);
     let found = [
         bound(points, low.max(outermost[0]), 1.0)?,
@@ -200,10 +203,10 @@ pub(super) fn slopes(points: &[(f64, f64)], [low, high]: [f64; 2]) -> Option<[f6
     (found[0] <= high && found[1] >= low).then_some(found)
 }
 
-/// The bound of the feasible slopes that is met from a slope below (`side` 1), above (−1) or on it. For the slope `b` the worst
-/// pair is the stamp that lies highest over `b i` and the upper end of the one that lies lowest; from `b`
-/// on to the slope that brings these two together, until no pair is apart. The function is convex and
-/// made of straight pieces, so that this ends after few steps; where it turns back, no slope is feasible.
+/// The bound of the feasible slopes, starting from a slope below (`side` 1) or above it (−1), or on it. For the slope
+/// `b` the worst pair is the stamp that lies highest over `b i` and the upper end of the one that lies lowest; the next
+/// slope brings these two together, until no pair violates the bound. The function is convex and piecewise linear, so
+/// this ends after few steps; if it turns back, no slope is feasible.
 fn bound(points: &[(f64, f64)], mut slope: f64, side: f64) -> Option<f64> {
     for _ in 0..100 {
         let (mut highest, mut lowest) = ((f64::NEG_INFINITY, 0), (f64::INFINITY, 0));
@@ -230,11 +233,12 @@ fn bound(points: &[(f64, f64)], mut slope: f64, side: f64) -> Option<f64> {
     None
 }
 
-/// Digits that a step near the ends of a range must take less than one in its middle half to be taken.
+/// Minimum saving in digits for a step near the ends of a range to be preferred over one in its middle
+/// half.
 const DIGITS_LESS: usize = 2;
 
-/// Of the steps in the middle half of a range the one that takes the fewest digits, itself or as a rate; of all steps, if
-/// that takes clearly fewer.
+/// The step in the middle half of a range with the fewest digits, itself or as a rate; any step of the range, if it has
+/// clearly fewer.
 pub(super) fn simplest([low_s, high_s]: [f64; 2]) -> f64 {
     let quarter = 0.25 * (high_s - low_s);
     let middle = 0.5 * (low_s + high_s);
@@ -254,13 +258,13 @@ pub(super) fn simplest([low_s, high_s]: [f64; 2]) -> f64 {
     }
 }
 
-/// Powers of a tenth that stamps are looked at as multiples of: from 1 on, and those above, as of nanoseconds of a clock that
+/// Exponents k of the quanta 10⁻ᵏ tried for stamps: from 1 down, and those above 1, as for nanoseconds of a clock that
 /// counts milliseconds.
 pub(super) const FINE: RangeInclusive<i32> = 0..=18;
 const COARSEST: RangeInclusive<i32> = -9..=-1;
 
-/// The largest of some powers of a tenth that all stamps are multiples of, and no more than the time that they are part of;
-/// none if even these are too large.
+/// The largest of some powers 10⁻ᵏ of which all stamps are multiples and which does not exceed their time
+/// span; `None` if even these are too large.
 pub(super) fn quantum(
     powers: RangeInclusive<i32>,
     span_s: f64,
@@ -270,7 +274,7 @@ pub(super) fn quantum(
     powers.filter(|q| *q <= 1.1 * span_s).find(|q| {
         stamps_s.clone().all(|t| {
             let multiple = t / q;
-            // Stamps in other units than seconds bring the rounding of a product.
+            // Stamps in units other than seconds have the rounding error of a product.
             (multiple - multiple.round()).abs() < 1e-6 + 4.0 * f64::EPSILON * multiple.abs()
         })
     })
@@ -305,7 +309,7 @@ mod tests {
             .map(|(i, n)| ((1e-3 * i as f64 + 2e-4 * n) * 1e6).round() * 1e-6)
             .collect();
         assert_eq!(rounded(&jitter), None);
-        // A time that begins anew with each block of two.
+        // A time axis that restarts with each block of two.
         let anew: Vec<f64> = (0..100).map(|i| 1e-5 * f64::from(i % 2)).collect();
         assert_eq!(rounded(&anew), None);
     }
@@ -338,13 +342,13 @@ mod tests {
                     let (step, slack) = (1.0 / rate_hz, 1e-9 / rate_hz);
                     let name = format!("{rate_hz} Hz, {decimals} decimals, {count}: {found:?}");
                     if low == high {
-                        // A second step of the staircase is missing.
+                        // No second step of the staircase.
                         assert!(f64::from(count) / rate_hz * scale < 3.0, "{name}");
                         continue;
                     }
                     assert!(low - slack <= step && step <= high + slack, "{name}");
                     assert!((found.step_s - step).abs() <= 0.75 * (high - low), "{name}");
-                    // Rates of few digits are found to the last one from a few seconds on.
+                    // Rates of few digits are exact from a few seconds on.
                     if rate_hz.fract() == 0.0 && (high - low) < 0.02 * step {
                         assert!((found.step_s / step - 1.0).abs() < 1e-9, "{name}");
                     }

@@ -1,18 +1,18 @@
 //! Runs of equal samples.
 
-/// Neighbouring samples of one value, as many as there are.
+/// A run of equal consecutive samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Run {
-    /// Index of the first.
+    /// Index of the first sample.
     pub start: usize,
-    /// How many.
+    /// Number of samples.
     pub length: usize,
-    /// Their value.
+    /// Value of the samples.
     pub value: f64,
 }
 
 impl Run {
-    /// Index after the last.
+    /// Index after the last sample.
     #[must_use]
     pub fn end(&self) -> usize {
         self.start + self.length
@@ -45,10 +45,10 @@ pub fn runs(samples: &[f64]) -> impl Iterator<Item = Run> + '_ {
     })
 }
 
-/// Lengths of runs that are told apart; longer ones count as this.
+/// Longest run length distinguished; longer ones count as this.
 const LONGEST: usize = 4096;
 
-/// How long the runs of a record are.
+/// Distribution of the run lengths of a record.
 #[derive(Debug, Clone)]
 pub(super) struct Lengths {
     counts: Vec<usize>,
@@ -57,7 +57,7 @@ pub(super) struct Lengths {
 
 impl Lengths {
     pub(super) fn of(runs: impl Iterator<Item = Run>) -> Self {
-        // As long as the longest run: tables of many short columns are gone through as well.
+        // Only as long as the longest run, as tables of many short columns are processed as well.
         let mut counts = Vec::new();
         let mut total = 0;
         for run in runs {
@@ -76,7 +76,7 @@ impl Lengths {
         self.total
     }
 
-    /// Number of runs whose length passes a test.
+    /// Number of runs whose length satisfies a predicate.
     pub(super) fn count(&self, is: impl Fn(usize) -> bool) -> usize {
         let lengths = self.counts.iter().enumerate();
         lengths
@@ -85,7 +85,7 @@ impl Lengths {
             .sum()
     }
 
-    /// Length that a part of the runs does not exceed; `None` if there are no runs.
+    /// Quantile of the run lengths; `None` if there are no runs.
     pub(super) fn quantile(&self, part: f64) -> Option<usize> {
         let wanted = (part * self.total as f64).ceil().max(1.0) as usize;
         let mut sum = 0;

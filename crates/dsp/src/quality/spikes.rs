@@ -1,19 +1,19 @@
-//! Samples that stand alone: a mark for no value, such as −9999, a drop-out of one sample, a glitch.
+//! Isolated outliers: a missing-value marker such as −9999, a drop-out of one sample, a glitch.
 
 use super::{excerpts, median};
 
-/// Most samples of a spike; longer drop-outs are those of [`stuck`](super::stuck).
+/// Maximum number of samples of a spike; longer drop-outs are handled by [`stuck`](super::stuck).
 const LONGEST: usize = 2;
-/// Samples on each side that must lie together.
+/// Number of samples on each side that must be close together.
 const BESIDE: usize = 2;
-/// Distance of a spike from the samples beside it, over how far these lie apart.
+/// Distance of a spike from its neighbours, relative to their spread.
 const APART: f64 = 10.0;
-/// The same, over the median of how far a sample lies from the mean of the two beside it: in white noise with a standard
-/// deviation of σ, 16.5 σ.
+/// The same, relative to the median distance of a sample from the mean of its two neighbours: 16.5 σ in white noise of
+/// standard deviation σ.
 const FAR: f64 = 20.0;
-/// Largest step over the mean one, up to which there is no spike.
+/// Ratio of the largest step to the mean one up to which there is no spike.
 pub(super) const EVEN: f64 = 8.0;
-/// Part of the samples from which spikes are the signal itself.
+/// Fraction of samples above which spikes are the signal itself.
 const MOST: f64 = 0.01;
 
 /// A spike.
@@ -23,21 +23,21 @@ pub struct Spike {
     pub index: usize,
     /// The sample.
     pub value: f64,
-    /// The one before.
+    /// The preceding sample.
     pub before: f64,
 }
 
 /// Spikes of a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spikes {
-    /// How many.
+    /// Number of spikes.
     pub count: usize,
-    /// The first of them.
+    /// The first spike.
     pub first: Spike,
 }
 
 impl Spikes {
-    /// All of several spikes.
+    /// Summary of several spikes.
     #[must_use]
     pub fn of(spikes: &[Spike]) -> Option<Self> {
         let count = spikes.len();
@@ -45,10 +45,10 @@ impl Spikes {
     }
 }
 
-/// Finds one or two samples in a row that lie far beyond the two on each side of them: at least ten times as far from each as
-/// these lie apart, and at least twenty times as far as the median sample (other than zero) lies from the mean of its
-/// neighbours. White noise has none; a peak or a step of the signal is no spike unless it takes less than three samples. If more than one
-/// sample in a hundred is one, they are the signal.
+/// Finds one or two consecutive samples far beyond the two on each side of them: at least ten times as far from each as
+/// these are apart, and at least twenty times the median (nonzero) distance of a sample from the mean of its
+/// neighbours. White noise has none; a peak or a step of the signal is no spike unless it takes less than three
+/// samples. If more than one sample in a hundred is a spike, they are the signal.
 ///
 /// ```
 /// use torqcomp_dsp::quality::spikes::spikes;
@@ -97,7 +97,7 @@ fn is_spike(samples: &[f64], at: usize, length: usize, far: f64) -> bool {
             || inside.iter().all(|x| *x < low && low - *x >= least))
 }
 
-/// Median of how far samples lie from the mean of the two beside them, those that lie on it left out.
+/// Median nonzero distance of a sample from the mean of its two neighbours.
 fn usual_bend(samples: &[f64]) -> f64 {
     let mut bends: Vec<f64> = excerpts(samples)
         .iter()

@@ -1,4 +1,4 @@
-//! The time axis: its usual step, and every step that is not.
+//! The time axis: its typical step, and all irregular steps.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -6,57 +6,57 @@ use serde::Serialize;
 use super::broken_line::BrokenLine;
 use super::median;
 
-/// A step longer than this many usual ones leaves out a sample.
+/// Ratio to the typical step above which a step leaves out a sample.
 const GAP: f64 = 1.5;
-/// Robust standard deviations from the usual step that a gap must lie away, besides.
+/// Additional minimum deviation of a gap from the typical step, in robust standard deviations.
 const OUTLIER: f64 = 6.0;
-/// Standard deviation over median absolute deviation of a normal distribution.
+/// Ratio of standard deviation to median absolute deviation of a normal distribution.
 const NORMAL: f64 = 1.4826;
-/// Events of one kind that are listed; all are counted.
+/// Maximum number of listed events of one kind; all are counted.
 const MOST_LISTED: usize = 100;
 
-/// What the steps between time stamps show.
+/// Analysis of the steps between time stamps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Steps {
-    /// Finite stamps.
+    /// Number of finite stamps.
     pub stamps: usize,
-    /// Stamps that are no finite numbers.
+    /// Number of non-finite stamps.
     pub non_finite: usize,
-    /// The usual step, in s.
+    /// Typical step, in s.
     pub typical_s: f64,
-    /// Deviations from it, of the steps that are neither gaps nor backward nor repeated; `None` if
-    /// there are fewer than two of them.
+    /// Relative deviations from it, without gaps, backward and repeated steps; `None` for fewer
+    /// than two steps.
     pub jitter: Option<Jitter>,
     /// Steps that leave out samples.
     pub gaps: Events,
-    /// Samples that the gaps leave out, if the clock was right.
+    /// Number of samples left out by the gaps, if the clock is right.
     pub missing: f64,
-    /// Forward steps longer than all of the time recorded besides: the clock was set, or two
+    /// Forward steps longer than the rest of the recorded time: the clock was set, or two
     /// recordings were joined.
     pub jumps: Events,
-    /// Steps backwards.
+    /// Backward steps.
     pub backwards: Events,
-    /// Stamps equal to the one before.
+    /// Stamps equal to the preceding one.
     pub repeated: Events,
 }
 
-/// Deviations of the regular steps from the usual one, over that one.
+/// Deviations of the regular steps from the typical one, relative to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jitter {
     /// Standard deviation.
     pub std: f64,
-    /// The largest.
+    /// Largest deviation.
     pub peak: f64,
 }
 
 /// Irregular steps of one kind.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Events {
-    /// How many there are.
+    /// Number of events.
     pub count: usize,
     /// The first hundred of them.
     pub listed: Vec<Event>,
-    /// The longest of all.
+    /// The longest event.
     pub longest: Option<Event>,
 }
 
@@ -89,18 +89,20 @@ impl Events {
     }
 }
 
-/// Looks at the steps of time stamps in s. `None` if fewer than two stamps are finite or none lies
-/// after another.
+/// Analyses the steps of time stamps in s. `None` if fewer than two stamps are finite or no stamp
+/// lies after another.
 ///
-/// The usual step `T` is the mean of the steps within 25 % of the median positive step; if more than
-/// 1 % of the steps are farther away (gaps), of those within 1 % (or 5 %) of it, if these are half of
-/// all. No fault of fewer than half of the steps can move it. With `s = 1.4826·MAD` of the steps:
+/// The typical step `T` is the mean of the steps within 25 % of the median positive step; if more
+/// than 1 % of the steps are farther away (gaps), of those within 1 % (or 5 %) of it, if these are
+/// half of all. A fault of fewer than half of the steps cannot move it. With `s = 1.4826·MAD` of the
+/// steps:
 /// * a step longer than `max(1.5 T, T + 6 s)` is a gap that leaves out `round(step/T) − 1` samples
-///   (normal jitter of any size exceeds 6 s once in 10⁹ steps);
-/// * a step longer than all regular steps together is a jump of the clock, not a gap;
-/// * steps of zero and below are exactly that.
+///   (normally distributed jitter of any size exceeds 6 s once in 10⁹ steps);
+/// * a step longer than all regular steps together is a clock jump, not a gap;
+/// * zero and negative steps are counted as such.
 ///
-/// Jitter is the standard deviation and the largest deviation of the other steps, over `T`.
+/// Jitter is the standard deviation and the largest deviation of the remaining steps, relative to
+/// `T`.
 ///
 /// ```
 /// use torqcomp_dsp::quality::steps::steps;
@@ -114,14 +116,14 @@ pub fn steps(stamps_s: &[f64]) -> Option<Steps> {
     steps_about(stamps_s, None)
 }
 
-/// As [`steps`](fn@steps), the usual step being known: that of the samples whose stamps are rounded to
-/// multiples of `quantum_s`. Steps that rounding explains are then neither gaps nor repeats.
+/// As [`steps`](fn@steps), for a known typical step of samples whose stamps are rounded to multiples
+/// of `quantum_s`. Steps explained by rounding are then neither gaps nor repeats.
 #[must_use]
 pub fn rounded_steps(stamps_s: &[f64], step_s: f64, quantum_s: f64) -> Option<Steps> {
     steps_about(stamps_s, Some((step_s, quantum_s)))
 }
 
-/// As [`steps`](fn@steps), of rounded stamps that leave out samples at known places.
+/// As [`steps`](fn@steps), for rounded stamps that leave out samples at known places.
 #[must_use]
 pub fn broken_steps(stamps_s: &[f64], broken: &BrokenLine) -> Option<Steps> {
     let step_s = broken.line.step_s;
@@ -188,7 +190,7 @@ impl Steps {
         if event.step_s < 0.0 {
             self.backwards.push(event);
         } else if event.step_s == 0.0 {
-            // Rounding makes equal stamps of samples that are closer than its quantum.
+            // Samples closer than the quantum have equal rounded stamps.
             if quantum_s < self.typical_s {
                 self.repeated.push(event);
             }
@@ -213,16 +215,16 @@ fn walk(stamps_s: &[f64]) -> impl Iterator<Item = (usize, f64, f64)> + '_ {
     })
 }
 
-/// Part of the median that a step may lie away from it and still be usual.
+/// Relative deviation from the median up to which a step is typical.
 const USUAL: f64 = 0.25;
-/// The same where there are gaps, the first that holds half of the steps.
+/// The same where there are gaps; the first that includes half of the steps applies.
 const CLOSE: [f64; 2] = [0.01, 0.05];
-/// Part of the steps that are usual where there are no gaps.
+/// Minimum fraction of typical steps in the absence of gaps.
 const NEARLY_ALL: f64 = 0.99;
-/// Steps out of which medians are taken.
+/// Maximum number of steps used for a median.
 const MOST_STEPS: usize = 1 << 18;
 
-/// Some of the steps, evenly spread where there are very many.
+/// All steps, or an evenly spread selection of very many.
 fn some_steps(stamps_s: &[f64]) -> Vec<f64> {
     let stride = stamps_s.len() / MOST_STEPS + 1;
     walk(stamps_s)
@@ -253,7 +255,7 @@ fn usual(stamps_s: &[f64]) -> Option<f64> {
     Some(sum / count)
 }
 
-/// Length from which a step is an outlier among the steps.
+/// Length above which a step is an outlier.
 fn gap_limit(stamps_s: &[f64], typical_s: f64) -> f64 {
     let mut deviations = some_steps(stamps_s);
     for step in &mut deviations {
@@ -285,7 +287,7 @@ mod tests {
 
     #[test]
     fn jitter_has_the_size_it_was_made_with_and_makes_no_gaps() {
-        // Independent stamps of standard deviation 0.05 T: steps of √2 of that.
+        // Independent stamp errors of standard deviation 0.05 T: √2 of that for the steps.
         let stamps: Vec<f64> = uniform(100_000)
             .iter()
             .zip(noise(5, 100_000))

@@ -1,4 +1,4 @@
-//! Drop-outs, standstills, spikes and clipping of a record that goes by as a stream, piece by piece.
+//! Drop-outs, standstills, spikes and clipping of a streamed record, piece by piece.
 
 use super::Run;
 use super::clipping::{Clipping, Rail, clipping};
@@ -6,13 +6,13 @@ use super::spikes::{EVEN, Spike, Spikes, spikes};
 use super::stuck::SHORTEST;
 use super::stuck::standstills;
 
-/// Samples of a piece that is judged at once; the last one has up to twice as many.
+/// Number of samples per piece; the last one has up to twice as many.
 const PIECE: usize = 1 << 16;
-/// Samples at the end of a piece that are judged again with the next one.
+/// Number of samples at the end of a piece that are judged again with the next one.
 const OVERLAP: usize = 1 << 10;
 
-/// Faults of a record of any length, in bounded memory. Each piece is judged by itself, as
-/// [`standstills`], [`spikes`] and [`clipping`] do with a record of its length.
+/// Faults of a record of any length, in bounded memory. Each piece is judged by itself, as by
+/// [`standstills`], [`spikes`] and [`clipping`] on a record of its length.
 ///
 /// ```
 /// use torqcomp_dsp::quality::streamed::StreamedFaults;
@@ -25,44 +25,44 @@ const OVERLAP: usize = 1 << 10;
 /// ```
 #[derive(Debug, Clone, Default)]
 pub struct StreamedFaults {
-    /// Samples not judged yet, behind those that were and are judged again.
+    /// Samples not judged yet, preceded by those to be judged again.
     kept: Vec<f64>,
     /// Index of the first of them in the record.
     first: usize,
-    /// Of these, how many were judged.
+    /// How many of these were already judged.
     judged: usize,
     last: Option<Run>,
-    /// Behind the last spike.
+    /// Index after the last spike.
     behind_spike: usize,
     found: Faults,
     low: Option<f64>,
     high: Option<f64>,
 }
 
-/// What a stream showed.
+/// Faults of a stream.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Faults {
-    /// Where it stands still.
+    /// Intervals in which the channel is stuck.
     pub standstills: Option<Standstills>,
-    /// Where it is clipped.
+    /// Clipping.
     pub clipping: Option<Clipping>,
-    /// Samples that stand alone.
+    /// Isolated outliers.
     pub spikes: Option<Spikes>,
 }
 
-/// Stretches in which a channel stands still.
+/// Intervals in which a channel is stuck.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standstills {
-    /// How many.
+    /// Number of intervals.
     pub count: usize,
-    /// Samples in all.
+    /// Total number of samples.
     pub samples: usize,
-    /// The longest of them.
+    /// The longest interval.
     pub longest: Run,
 }
 
 impl Faults {
-    /// Those of samples that are so many times as large, a positive number.
+    /// For samples scaled by a positive factor.
     #[must_use]
     pub fn scaled(mut self, scale: f64) -> Self {
         if let Some(found) = &mut self.standstills {
@@ -83,7 +83,7 @@ impl Faults {
 }
 
 impl Standstills {
-    /// All of several runs.
+    /// Summary of several runs.
     #[must_use]
     pub fn of(runs: &[Run]) -> Option<Self> {
         let one = |run: &Run| Self {
@@ -109,7 +109,7 @@ impl Standstills {
 }
 
 impl StreamedFaults {
-    /// Takes the next samples, which are numbers.
+    /// Takes the next samples, which must be finite.
     pub fn push(&mut self, samples: &[f64]) {
         self.kept.extend_from_slice(samples);
         while self.kept.len() >= 2 * PIECE + OVERLAP {
@@ -125,7 +125,7 @@ impl StreamedFaults {
     pub fn finish(mut self) -> Faults {
         self.judge(self.kept.len());
         self.close();
-        // Beyond a rail, the record was not cut off there.
+        // With samples beyond a rail, the record was not clipped there.
         let is_end = |rail: &Rail, end: Option<f64>| Some(rail.value) == end;
         let clipping = self.found.clipping.map(|clipping| Clipping {
             low: clipping.low.filter(|rail| is_end(rail, self.low)),
@@ -159,7 +159,7 @@ impl StreamedFaults {
         self.kept = kept;
     }
 
-    /// Lengthens a standstill that reached the end of the samples judged before.
+    /// Extends a standstill that reached the end of the samples judged before.
     fn lengthen(&mut self, more: &[f64]) {
         let end = self.first + self.judged;
         if let Some(last) = self.last.as_mut().filter(|last| last.end() == end) {
@@ -209,9 +209,9 @@ impl StreamedFaults {
         }
     }
 
-    /// Looks for clipping at the ends of a piece's range.
+    /// Tests for clipping at the ends of a piece's range.
     fn look_at_ends(&mut self, piece: &[f64], ends: [f64; 2]) {
-        // A cut-off peak has three equal samples at least.
+        // A clipped peak has at least three equal samples.
         if !has_three_at(piece, ends) {
             return;
         }
@@ -230,7 +230,7 @@ impl StreamedFaults {
     }
 }
 
-/// The outer one of two rails, or both together if they are the same; those in the overlap count twice.
+/// The outer one of two rails, or both merged if they are equal; samples in the overlap count twice.
 fn outermost(a: Option<Rail>, b: Option<Rail>, sign: f64) -> Option<Rail> {
     let (Some(one), Some(other)) = (a, b) else {
         return a.or(b);
@@ -247,29 +247,29 @@ fn outermost(a: Option<Rail>, b: Option<Rail>, sign: f64) -> Option<Rail> {
     })
 }
 
-/// Samples that are gone through at once: loops of so many need no branch.
+/// Number of samples per inner loop, which then needs no branch.
 const AT_ONCE: usize = 1 << 8;
 
-/// Parts of a piece that overlap by some samples.
+/// Parts of a piece with some overlap.
 fn parts(piece: &[f64], overlap: usize) -> impl Iterator<Item = &[f64]> {
     let starts = (0..piece.len().saturating_sub(overlap)).step_by(AT_ONCE);
     starts.map(move |start| &piece[start..(start + AT_ONCE + overlap).min(piece.len())])
 }
 
-/// What one pass over a piece shows.
+/// Result of one pass over a piece.
 struct Extremes {
     low: f64,
     high: f64,
     /// Largest step from sample to sample.
     step: f64,
-    /// The mean one.
+    /// Mean step.
     mean_step: f64,
 }
 
 impl Extremes {
-    /// Of samples that are numbers.
+    /// For finite samples.
     fn of(piece: &[f64]) -> Self {
-        // In lanes, which a processor takes at once.
+        // In lanes, for SIMD.
         const LANES: usize = 8;
         let lesser = |a: f64, b: f64| if a < b { a } else { b };
         let greater = |a: f64, b: f64| if a > b { a } else { b };
@@ -308,7 +308,7 @@ impl Extremes {
     }
 }
 
-/// Whether three samples in a row lie at one of the ends.
+/// Whether three consecutive samples lie at one of the ends.
 fn has_three_at(piece: &[f64], [low, high]: [f64; 2]) -> bool {
     parts(piece, 2).any(|part| {
         let three = part.iter().zip(&part[1..]).zip(&part[2..]);
@@ -319,11 +319,11 @@ fn has_three_at(piece: &[f64], [low, high]: [f64; 2]) -> bool {
     })
 }
 
-/// Whether there may be something that [`standstills`] finds: a long run of equal samples, or a short one beside the largest
-/// step of all, since a drop-out's are larger than all others.
+/// Whether [`standstills`] may find something: a long run of equal samples, or a short one next to the largest step of
+/// all, as a drop-out has the largest steps.
 fn may_stand_still(piece: &[f64], largest: f64) -> bool {
     let are_equal = |run: &[f64]| run.iter().all(|x| *x == run[0]);
-    // Of a run of twenty, samples ten apart are equal, and so are those between.
+    // In a run of twenty, samples ten apart are equal, and so are those between.
     let apart = SHORTEST / 2;
     let mut some = (0..piece.len().saturating_sub(apart)).step_by(apart);
     if some.any(|at| piece[at] == piece[at + apart] && are_equal(&piece[at..=at + apart])) {
@@ -395,7 +395,7 @@ mod tests {
         let whole = sine(2.0, 97.3, count);
         let mut cut = whole.clone();
         cut[300_000..].iter_mut().for_each(|x| *x = x.min(1.5));
-        // Beyond the level elsewhere: nothing was cut off by the recorder.
+        // The signal exceeds the level elsewhere, so the recorder did not clip it.
         assert_eq!(of(&cut, 8192).clipping, None);
         let small = cut.iter().enumerate();
         let small: Vec<f64> = small

@@ -1,27 +1,27 @@
-//! A channel that stands still: for the whole record, or for a while.
+//! A stuck channel: constant for the whole record, or for a while.
 
 use super::{Run, median, range, runs};
 
-/// Fewest samples of a standstill.
+/// Minimum number of samples of a standstill.
 pub(super) const SHORTEST: usize = 20;
-/// Part of the samples outside standstills that may repeat the one before; above it, standing still
-/// is what the channel does.
+/// Maximum fraction of repeated samples outside standstills; above it, repetition is normal for the
+/// channel.
 const LIVELY: f64 = 0.5;
-/// Fewest samples outside standstills from which that part is told.
+/// Minimum number of samples outside standstills for that fraction.
 const FEWEST: usize = 50;
-/// Chance, over the whole record, of a standstill by accident.
+/// Probability of an accidental standstill over the whole record.
 const CHANCE: f64 = 1e-6;
-/// Usual step, over the smallest, of a channel that moves by many steps of its resolution.
+/// Ratio of the typical to the smallest step of a channel that moves by many resolution steps.
 const FINE: f64 = 4.0;
-/// Step into or out of a standstill, over the usual one, from which it is abrupt.
+/// Step into or out of a standstill, relative to the typical one, above which it is abrupt.
 const ABRUPT: f64 = 0.5;
-/// Fewest samples of a drop-out.
+/// Minimum number of samples of a drop-out.
 const FEWEST_DROPPED: usize = 3;
-/// Steps into and out of a drop-out, over the largest one anywhere else.
+/// Steps into and out of a drop-out, relative to the largest one elsewhere.
 const FAR: f64 = 3.0;
 
-/// The value of a channel that has only one; `None` if it has several, or fewer than two samples.
-/// That is a fact; whether it is a fault, the user knows.
+/// The value of a constant channel; `None` if it has several values, or fewer than two samples.
+/// Only the user knows whether that is a fault.
 ///
 /// ```
 /// use torqcomp_dsp::quality::stuck::constant;
@@ -34,20 +34,19 @@ pub fn constant(samples: &[f64]) -> Option<f64> {
     (low == high && samples.len() > 1).then_some(low)
 }
 
-/// Finds where a lively channel stands still, in order.
+/// Finds standstills of an otherwise lively channel, in order.
 ///
-/// In `n` samples that repeat the one before with probability `p` (counted outside runs of 20 and
-/// more), a run of `L` happens by chance `n pᴸ⁻¹` times. A run is a standstill if that is below
-/// 10⁻⁶, `L ≥ 20`, the channel is lively (`p < ½`, and the median of its steps other than zero is at
-/// least four times the smallest: a slow signal repeats values wherever it is slowest), and the run begins or ends abruptly: with a step
-/// of at least half the median one. A drive that comes to rest slows down first, so that it is not
-/// reported; of real standstills in noise, one in fourteen is missed for that.
+/// In `n` samples that repeat the preceding one with probability `p` (outside runs of 20 and more), the expected number
+/// of chance runs of `L` is `n pᴸ⁻¹`. A run is a standstill if that is below 10⁻⁶, `L ≥ 20`, the channel is lively
+/// (`p < ½`, and the median of its nonzero steps is at least four times the smallest: a slow signal repeats values
+/// wherever it is slowest), and the run begins or ends abruptly: with a step of at least half the median one. A drive
+/// that comes to rest slows down first, so it is not reported; one in fourteen genuine standstills in noise is missed
+/// for that reason.
 ///
-/// A shorter run counts if the signal jumps to it and back again, each time at least three times as far as anywhere else: the
-/// drop-out of a cable or of a recorder.
+/// A shorter run counts if the signal jumps to it and back again, each time at least three times as far as anywhere
+/// else: a drop-out of a cable or recorder.
 ///
-/// Runs at the channel's extreme values count too: a caller that knows them to be clipping leaves
-/// them out.
+/// Runs at the channel's extreme values count too; the caller excludes those known to be clipping.
 ///
 /// ```
 /// use torqcomp_dsp::quality::stuck::standstills;
@@ -92,7 +91,7 @@ fn is_aside(samples: &[f64], run: &Run) -> bool {
     run.length >= FEWEST_DROPPED && is_inside && product > 0.0
 }
 
-/// Largest step outside runs, which are in order, and not beside them.
+/// Largest step outside the runs, which are in order, and not adjacent to them.
 fn largest_step_between(runs: &[Run], samples: &[f64]) -> f64 {
     let starts = runs.iter().map(|run| run.start).chain([samples.len()]);
     let ends = [0].into_iter().chain(runs.iter().map(Run::end));
@@ -101,7 +100,7 @@ fn largest_step_between(runs: &[Run], samples: &[f64]) -> f64 {
     steps.fold(0.0, |largest, pair| (pair[1] - pair[0]).abs().max(largest))
 }
 
-/// Median and smallest of the steps that are not zero.
+/// Median and smallest of the nonzero steps.
 fn usual_and_smallest_step(samples: &[f64]) -> (f64, f64) {
     let mut steps: Vec<f64> = super::excerpts(samples)
         .iter()
@@ -117,7 +116,7 @@ fn is_abrupt(samples: &[f64], run: &Run, least: f64) -> bool {
     steps_beside(samples, run).any(|step| step.abs() >= least)
 }
 
-/// The samples beside a run, less its value.
+/// Differences of the samples next to a run from its value.
 fn steps_beside(samples: &[f64], run: &Run) -> impl Iterator<Item = f64> {
     let into = run.start.checked_sub(1).map(|i| samples[i]);
     let out = samples.get(run.end()).copied();
@@ -157,7 +156,7 @@ mod tests {
 
     #[test]
     fn coming_to_rest_is_not_getting_stuck() {
-        // A cosine that stops for a while at its top, where its speed is zero.
+        // A cosine that pauses at its maximum, where its speed is zero.
         let stop: Vec<f64> = (0..3000)
             .map(|i| match i {
                 0..1000 => (std::f64::consts::TAU * f64::from(i) / 1000.0).cos(),
@@ -179,11 +178,11 @@ mod tests {
         let found = standstills(&dropped);
         let places: Vec<(usize, usize)> = found.iter().map(|r| (r.start, r.length)).collect();
         assert_eq!(places, [(8000, 12), (9000, 7)]);
-        // No farther than the record steps by itself.
+        // No farther than a typical step of the record.
         let mut near = good.clone();
         near[8000..8012].fill(0.0);
         assert_eq!(standstills(&near), []);
-        // Steps between levels, as of a set point, are no drop-outs.
+        // Steps between levels, as of a set point, are not drop-outs.
         let levels: Vec<f64> = (0..5000)
             .map(|i| if i % 100 < 6 { 5.0 } else { 0.0 })
             .collect();

@@ -1,8 +1,8 @@
-//! Number, range, mean and spread of samples that go by.
+//! Running statistics of a stream: number, range, mean and standard deviation.
 
-/// What samples come to that need not be kept.
+/// Statistics of samples that are not kept.
 ///
-/// Mean and squares without the loss of digits of a sum of squares: B. P. Welford, Technometrics 4 (1962) 419.
+/// Mean and squares without cancellation: B. P. Welford, Technometrics 4 (1962) 419.
 ///
 /// ```
 /// use torqcomp_dsp::quality::sums::SampleSums;
@@ -15,13 +15,13 @@
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SampleSums {
-    /// How many there were.
+    /// Number of samples.
     pub samples: usize,
     finite: usize,
     low: f64,
     high: f64,
     mean: f64,
-    /// Sum of the squared distances from the mean.
+    /// Sum of squared deviations from the mean.
     squares: f64,
 }
 
@@ -53,13 +53,13 @@ impl SampleSums {
         self.squares += before * (sample - self.mean);
     }
 
-    /// Samples that are no finite numbers.
+    /// Number of non-finite samples.
     #[must_use]
     pub fn non_finite(&self) -> usize {
         self.samples - self.finite
     }
 
-    /// Least and greatest finite sample.
+    /// Smallest and largest finite sample.
     #[must_use]
     pub fn range(&self) -> Option<(f64, f64)> {
         (self.finite > 0).then_some((self.low, self.high))

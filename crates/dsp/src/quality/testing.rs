@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-/// White noise of unit variance, nearly normal: sums of twelve uniform numbers. Seeded.
+/// Seeded white noise of unit variance, nearly normal: sums of twelve uniform numbers.
 pub fn noise(seed: u64, count: usize) -> Vec<f64> {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     let mut uniform = move || {
@@ -16,7 +16,7 @@ pub fn noise(seed: u64, count: usize) -> Vec<f64> {
         .collect()
 }
 
-/// A sine of that amplitude and number of samples a period.
+/// A sine of this amplitude and number of samples per period.
 pub fn sine(amplitude: f64, period: f64, count: usize) -> Vec<f64> {
     (0..count)
         .map(|i| amplitude * (TAU * i as f64 / period + 0.3).sin())

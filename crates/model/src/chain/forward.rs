@@ -13,7 +13,7 @@ use crate::simulate::{
     held_response, integrate,
 };
 
-/// A record on its way through the chain, in the domain that the last link left it in.
+/// A record on its way through the chain, in the domain in which the last link left it.
 enum Signal {
     Spectrum(Vec<Complex64>),
     Samples(Vec<f64>),
@@ -35,19 +35,19 @@ impl Signal {
     }
 }
 
-/// A stand that is simulated.
+/// A stand to be simulated.
 #[derive(Clone, Copy)]
 pub struct StandRun<'a> {
     /// The stand.
     pub chain: &'a Chain,
     /// Its motion at the first sample.
     pub start: MotionState,
-    /// Displacement by a constant load, in the place of [that of the stand](Chain::shift).
+    /// Displacement under a constant load, instead of [the stand's own](Chain::shift).
     pub shift: f64,
 }
 
 impl<'a> StandRun<'a> {
-    /// A stand as it is.
+    /// The stand with its own constant load.
     #[must_use]
     pub fn of(chain: &'a Chain, start: MotionState) -> Self {
         Self {
@@ -57,7 +57,7 @@ impl<'a> StandRun<'a> {
         }
     }
 
-    /// Its record for an input, as of [`Chain::simulate`].
+    /// The record for an input, see [`Chain::simulate`].
     #[must_use]
     pub fn simulate(self, input: &Excitation) -> Vec<f64> {
         Chain::simulate_all(&[self], input)
@@ -66,7 +66,7 @@ impl<'a> StandRun<'a> {
     }
 }
 
-/// What the gage shows of motions that are integrated in time.
+/// Gage signals of motions integrated in time.
 fn integrate_all<'a>(
     runs: impl Iterator<Item = &'a StandRun<'a>>,
     input: &Excitation,
@@ -91,17 +91,17 @@ fn integrate_all<'a>(
 }
 
 impl Chain {
-    /// The record for an input. Lines are not in it: their phase belongs to a record.
+    /// The record for an input, without lines: their phase differs from record to record.
     ///
-    /// A motion that [is integrated](Self::is_integrated) starts from `start`; any other from the steady state of what
-    /// continues the record backwards. Samples after the motion has left all bounds are NaN.
+    /// A motion that [is integrated](Self::is_integrated) starts from `start`, any other in the steady state of the
+    /// backward extension of the record. Samples are NaN once the motion has diverged.
     #[must_use]
     pub fn simulate(&self, input: &Excitation, start: MotionState) -> Vec<f64> {
         StandRun::of(self, start).simulate(input)
     }
 
-    /// The records of several stands for one input, each as of [`simulate`](Self::simulate); motions that are integrated take
-    /// their steps in turn, which is faster than one after the other.
+    /// The records of several stands for one input, each as from [`simulate`](Self::simulate). Integrated motions are
+    /// stepped alternately, which is faster than one after the other.
     #[must_use]
     pub fn simulate_all(runs: &[StandRun<'_>], input: &Excitation) -> Vec<Vec<f64>> {
         let integrated = runs.iter().filter(|run| run.chain.is_integrated());
@@ -115,14 +115,14 @@ impl Chain {
         runs.iter().map(record).collect()
     }
 
-    /// The record for an input when the stand is at rest before it, by integration in time.
+    /// The record for an input from the state `start`, by integration in time.
     #[must_use]
     pub fn simulate_from(&self, input: &Excitation, start: MotionState) -> Vec<f64> {
         let mut shown = integrate_all([StandRun::of(self, start)].iter(), input);
         self.recorded_if_finite(shown.pop().unwrap_or_default(), input)
     }
 
-    /// What the links after the stand make of what the gage shows, as long as that is in bounds.
+    /// The gage signal passed through the links after the stand, up to where it diverges.
     fn recorded_if_finite(&self, shown: Vec<f64>, input: &Excitation) -> Vec<f64> {
         match shown.last().is_some_and(|x| x.is_finite()) {
             true => self.recorded(shown, input),
@@ -130,14 +130,14 @@ impl Chain {
         }
     }
 
-    /// Records of the free motion from a unit displacement and from a unit speed over `ω₀`.
+    /// Free responses to a unit displacement and to a unit of speed over `ω₀`.
     #[must_use]
     pub fn free_motion(&self, rate_hz: f64, count: usize) -> [Vec<f64>; 2] {
         free_motion(&self.stand.first(), rate_hz, count)
     }
 
-    /// Displacement and speed at the first sample, in the steady state of what continues the record
-    /// backwards; torques left out.
+    /// Displacement and speed at the first sample, in the steady state of the backward extension of
+    /// the record; without torques.
     #[must_use]
     pub fn state_at_start(&self, input: &Excitation) -> [f64; 2] {
         let Signal::Spectrum(x) = self.respond(input) else {
@@ -163,15 +163,15 @@ impl Chain {
         self.begins_at_start || self.has_torques()
     }
 
-    /// Whether something changes samples behind the stand.
+    /// Whether a link after the stand distorts samples.
     #[must_use]
     pub fn distorts(&self) -> bool {
         let mut actions = self.links.iter().map(|link| &link.action);
         actions.any(|action| matches!(action, Action::Distortion(_)))
     }
 
-    /// The mode in which the stand moves freely in small motions, with the stiffness `k` that torques add, relative to its
-    /// own: `ω √(1 + k)` and `ζ/√(1 + k)`; of several modes the first.
+    /// Mode of small free motions, with the relative stiffness `k` that torques add: `ω √(1 + k)` and `ζ/√(1 + k)`; the
+    /// first mode if there are several.
     ///
     /// ```
     /// use torqcomp_model::{Chain, Link, Mode, effects::Effect};
@@ -196,7 +196,7 @@ impl Chain {
         }
     }
 
-    /// Stiffness that the torques add at small displacements, relative to that of the plain stand.
+    /// Stiffness that torques add at small displacements, relative to that of the plain stand.
     #[must_use]
     pub fn added_stiffness(&self) -> f64 {
         self.torques()
@@ -205,18 +205,18 @@ impl Chain {
             .sum()
     }
 
-    /// Whether a constant load matters beyond a constant in the record.
+    /// Whether a constant load changes more than the offset of the record.
     #[must_use]
     pub fn has_zero(&self) -> bool {
         self.torques().iter().any(|(torque, _)| torque.has_zero())
     }
 
-    /// A motion that begins.
+    /// Initial state of a motion.
     pub(crate) fn begin(&self, start: MotionState) -> MotionProgress {
         MotionProgress::begin(&self.torques(), (&self.stand, start), self.shift)
     }
 
-    /// What the gage shows of the motion at some samples of the input, see [`integrate`].
+    /// Gage signal over a range of samples of the input, see [`integrate`].
     pub(crate) fn integrated_over(
         &self,
         input: &Excitation,
@@ -234,7 +234,7 @@ impl Chain {
         shown.pop().unwrap_or_default()
     }
 
-    /// What the links after the stand make of what the gage shows.
+    /// The gage signal passed through the links after the stand.
     pub(crate) fn recorded(&self, shown: Vec<f64>, input: &Excitation) -> Vec<f64> {
         self.record(Signal::Samples(shown), input)
     }
@@ -249,7 +249,8 @@ impl Chain {
             Between::Held => {
                 let held = held_response(&self.stand, 1.0 / input.rate_hz());
                 let line = |(k, u): (usize, &Complex64)| {
-                    // The spectrum is that of what acts; the samples' own goes to the sampled motion.
+                    // The spectrum describes the continuous input; the sampled motion uses that of
+                    // the samples.
                     let omega = input.omega_rad_s(k);
                     let cycles = omega / (TAU * input.rate_hz());
                     u / Between::Held.factor(cycles) * self.gain * held(omega)
@@ -264,7 +265,7 @@ impl Chain {
         Signal::Spectrum(spectrum)
     }
 
-    /// What the links after the stand make of the motion.
+    /// The motion passed through the links after the stand.
     fn record(&self, mut signal: Signal, input: &Excitation) -> Vec<f64> {
         for link in self.links.iter().filter(|link| link.stage > Stage::Stand) {
             signal = self.apply(&link.action, signal, input);
@@ -296,7 +297,7 @@ impl Chain {
                 distortion.forward(clock, &mut samples);
                 Signal::Samples(samples)
             }
-            // The phase of a line and a slow course belong to a record.
+            // The phase of a line and a slow trend differ from record to record.
             Action::Recorder { .. }
             | Action::Torque { .. }
             | Action::Lines(_)

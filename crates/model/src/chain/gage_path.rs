@@ -1,38 +1,38 @@
-//! The displacement behind a gage that shows a torque of the stand beside it: `y = x + n(x)`, solved for `x` in time
+//! Displacement from a gage signal that includes a torque of the stand: `y = x + n(x)`, solved for `x` in time
 //! order, as the torque may have memory.
 
 use std::ops::Range;
 
 use crate::effects::{Memory, Torque, bridge};
 
-/// Halvings of a bracket.
+/// Bisections of a bracket.
 const HALVINGS: usize = 60;
 /// Doublings of a bracket's width.
 const WIDENINGS: usize = 40;
-/// Noise, in standard deviations, within which a signal counts as nothing.
+/// Threshold in standard deviations of the noise below which a signal counts as zero.
 const NOTHING: f64 = 3.0;
 
-/// The torques that a gage shows beside the displacement.
+/// Torques that the gage shows in addition to the displacement.
 pub struct GagePath<'a> {
     torques: Vec<&'a dyn Torque>,
     shift: f64,
-    /// Half the range in which nothing is shown.
+    /// Half-width of the displacement range in which the gage shows nothing.
     hidden: f64,
-    /// Signal that counts as nothing.
+    /// Signal below which the gage counts as showing nothing.
     nothing: f64,
     state: GageState,
 }
 
-/// What a gage's path remembers from window to window.
+/// State carried from window to window.
 #[derive(Debug, Clone, Default)]
 pub struct GageState {
     memories: Vec<Memory>,
-    /// Displacements of the end of the block before.
+    /// Displacements at the end of the previous block.
     kept: Option<Vec<f64>>,
 }
 
 impl<'a> GagePath<'a> {
-    /// These torques, which see a displacement `shift` beside that in the signal; `noise_std` is the standard deviation
+    /// Torques that see a displacement offset by `shift` from that in the signal; `noise_std` is the standard deviation
     /// of a sample.
     #[must_use]
     pub fn new(torques: Vec<&'a dyn Torque>, shift: f64, noise_std: f64) -> Self {
@@ -45,27 +45,27 @@ impl<'a> GagePath<'a> {
         }
     }
 
-    /// Goes on from a state.
+    /// Continues from a state.
     #[must_use]
     pub fn from(mut self, state: GageState) -> Self {
         self.state = state;
         self
     }
 
-    /// What it remembers behind the last window.
+    /// State after the last window.
     #[must_use]
     pub fn state(&self) -> GageState {
         self.state.clone()
     }
 
-    /// Whether it holds no torque: the signal is then the displacement.
+    /// Whether there is no torque, so that the signal is the displacement.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.torques.is_empty()
     }
 
-    /// Displacement over a window of the signal, and the places within `inner` where the signal does not determine it.
-    /// Windows come in order of time; what a torque remembers moves on with them.
+    /// Displacement over a window of the signal, and the indices within `inner` at which the signal does not determine
+    /// it. Windows must come in order of time; the torques' memory advances with them.
     pub fn displacement(&mut self, signal: &[f64], inner: Range<usize>) -> (Vec<f64>, Vec<usize>) {
         let mut x = signal.to_vec();
         let mut unknown = vec![false; signal.len()];
@@ -96,7 +96,7 @@ impl<'a> GagePath<'a> {
         (x, inner.filter(|i| unknown[*i]).collect())
     }
 
-    /// What comes before the part that is solved: from the block before, or as far off as the first.
+    /// Displacement before the solved part: from the previous block; in the first, offset like the first sample.
     fn before(&self, x: &mut [f64], signal: &[f64], start: usize) {
         match &self.state.kept {
             Some(kept) => x[..start].copy_from_slice(kept),
@@ -107,7 +107,7 @@ impl<'a> GagePath<'a> {
         }
     }
 
-    /// Torques at a displacement; memory moves on.
+    /// Sum of the torques at a displacement; advances their memory.
     fn sum(&self, memories: &mut [Memory], x: f64) -> f64 {
         let pairs = self.torques.iter().zip(memories);
         pairs
@@ -115,7 +115,7 @@ impl<'a> GagePath<'a> {
             .sum()
     }
 
-    /// The root of `x + n(x) = y` nearest to the displacement before, if there is one.
+    /// The root of `x + n(x) = y` nearest to the previous displacement, if there is one.
     fn solve(&self, memories: &[Memory], y: f64, near: f64) -> Option<f64> {
         if self.hidden > 0.0 {
             let shifted = y + self.shift;
@@ -127,7 +127,7 @@ impl<'a> GagePath<'a> {
         if here == 0.0 {
             return Some(near);
         }
-        // The root lies against the sign of what is over.
+        // The root lies in the direction opposite to the sign of the excess.
         let mut width = here.abs();
         let (mut a, mut fa) = (near, here);
         for _ in 0..WIDENINGS {
@@ -137,7 +137,7 @@ impl<'a> GagePath<'a> {
                 return Some(root(over, (a, fa), (b, fb)));
             }
             if fb.abs() > fa.abs() {
-                // The curve turns back: beyond, no displacement belongs to this signal.
+                // The curve turns back: no displacement beyond gives this signal.
                 return None;
             }
             (a, fa) = (b, fb);
@@ -147,7 +147,7 @@ impl<'a> GagePath<'a> {
     }
 }
 
-/// A root between two points of different sign, by the Illinois method.
+/// The root within a bracket, by the Illinois method.
 fn root(f: impl Fn(f64) -> f64, mut a: (f64, f64), mut b: (f64, f64)) -> f64 {
     for _ in 0..HALVINGS {
         if b.1 == 0.0 || (b.0 - a.0).abs() <= 4.0 * f64::EPSILON * b.0.abs() {

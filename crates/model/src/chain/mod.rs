@@ -5,10 +5,10 @@
 //!                                                                   disturbances ─┘
 //! ```
 //!
-//! Forwards: [`Chain::simulate`]. Backwards the links are taken in reverse order, those of
-//! [`Chain::groups`] together: every effect says in its own file how ([`Distortion::inverse`](crate::effects::Distortion),
-//! [`subtract_lines`](crate::effects::subtract_lines), [`Torque::blurred`](crate::effects::Torque)), and the linear ones
-//! are divided out of the spectrum ([`Chain::divide_out`], [`Chain::response_of`]).
+//! Forward: [`Chain::simulate`]. The inverse takes the links in reverse order, those of one of the [`Chain::groups`]
+//! together: nonlinear effects are inverted in their own files ([`Distortion::inverse`](crate::effects::Distortion),
+//! [`subtract_lines`](crate::effects::subtract_lines), [`Torque::blurred`](crate::effects::Torque)), and the linear
+//! ones are divided out of the spectrum ([`Chain::divide_out`], [`Chain::response_of`]).
 
 mod forward;
 mod gage_path;
@@ -24,11 +24,11 @@ use crate::modal::ModalResponse;
 pub use forward::StandRun;
 pub use gage_path::{GagePath, GageState};
 
-/// Frequency, over the natural one, that is next to rest.
+/// Frequency, relative to the natural one, at which the limit at DC is evaluated.
 const NEAR_REST: f64 = 1e-6;
-/// Step of a factor at rest, relative to the factor, that is none.
+/// Change of a factor across DC, relative to the factor, that still counts as continuous.
 const LARGEST_STEP: f64 = 1e-4;
-/// Response at rest, relative to that at the natural frequency, below which a link passes no constant.
+/// Response at DC, relative to that at the natural frequency, below which a link blocks constants.
 const NONE_AT_REST: f64 = 1e-9;
 
 /// A link of the chain: one effect, or the recorder.
@@ -38,7 +38,7 @@ pub struct Link {
     pub effect: &'static str,
     /// Its form.
     pub form: &'static str,
-    /// Where it sits.
+    /// Its place in the chain.
     pub stage: Stage,
     /// What it does.
     pub action: Action,
@@ -47,28 +47,28 @@ pub struct Link {
 /// A stand with its effects and its recorder, from the applied quantity to the record.
 #[derive(Debug)]
 pub struct Chain {
-    /// The linear stand.
+    /// Linear response of the stand.
     pub stand: ModalResponse,
-    /// Recorded per applied quantity, at rest.
+    /// Static gain: recorded per applied quantity.
     pub gain: f64,
-    /// Displacement, in units of the record, by a load that does not change and is not in the input: torques of
-    /// the stand see it; what the gage shows of it is left to the record's own constant.
+    /// Displacement, in units of the record, under a constant load that is not in the input. Torques of the
+    /// stand see it; its effect on the gage signal belongs to the record's offset.
     pub shift: f64,
-    /// Whether the motion is integrated from a start although no torque of the stand needs it: a change of the samples
-    /// behind the stand sees the free motion from there as well.
+    /// Whether the motion is integrated from an initial state although no torque of the stand requires it: distortions
+    /// after the stand then see the free motion as well.
     pub begins_at_start: bool,
-    /// In the order from torque to record.
+    /// In order from torque to record.
     links: Vec<Link>,
 }
 
-/// Links that are taken back together.
+/// Links that are inverted together.
 #[derive(Debug)]
 pub enum Group<'a> {
     /// Torques of the stand.
     Torques(Vec<&'a Link>),
     /// Factors and terms of the response.
     Linear(Vec<&'a Link>),
-    /// A change of samples.
+    /// A distortion of the samples.
     Distortion(&'a Link),
 }
 
@@ -96,7 +96,7 @@ impl Link {
         }
     }
 
-    /// Whether it is a factor or a term of the response.
+    /// Whether it is a factor or term of the response.
     #[must_use]
     pub fn is_linear(&self) -> bool {
         matches!(
@@ -105,14 +105,13 @@ impl Link {
         )
     }
 
-    /// Whether what is applied reaches the record past the stand.
+    /// Whether the applied quantity reaches the record past the stand.
     #[must_use]
     pub fn is_feedthrough(&self) -> bool {
         matches!(self.action, Action::Feedthrough(_))
     }
 
-    /// Whether the impulse response of its inverse dies out: a factor goes over into a constant at rest that is not
-    /// zero, without a step.
+    /// Whether the impulse response of its inverse decays: the factor is continuous at DC, with a nonzero limit.
     #[must_use]
     pub fn dies_out(&self, stand: &ModalResponse) -> bool {
         let Action::Factor(factor) = &self.action else {
@@ -120,12 +119,12 @@ impl Link {
         };
         let at_rest = factor(stand, 0.0);
         let near = factor(stand, NEAR_REST * stand.first().omega_rad_s);
-        // Of both signs of frequency the constant is the same only if it is real.
+        // The limit is the same for both signs of frequency only if it is real.
         let step = (near - at_rest).norm().max(near.im.abs());
         at_rest.norm() > 0.0 && step < LARGEST_STEP * at_rest.norm()
     }
 
-    /// Whether it passes no constant.
+    /// Whether it blocks constants.
     #[must_use]
     pub fn blocks_constants(&self, stand: &ModalResponse) -> bool {
         let Action::Factor(factor) = &self.action else {
@@ -160,13 +159,13 @@ impl Chain {
         }
     }
 
-    /// The same with a displacement by a constant load.
+    /// Sets the displacement under a constant load.
     #[must_use]
     pub fn with_shift(self, shift: f64) -> Self {
         Self { shift, ..self }
     }
 
-    /// The same with a recorder, which comes before all else in its stage.
+    /// Adds a recorder, as the first link of its stage.
     #[must_use]
     pub fn with_recorder(mut self, recorder: Option<Fixed>, is_ideal: bool) -> Self {
         if let Some(response) = recorder {
@@ -182,7 +181,7 @@ impl Chain {
         self
     }
 
-    /// The same with more links; those of one stage stay in the order given.
+    /// Adds links; those of one stage keep the given order.
     #[must_use]
     pub fn with_links(mut self, links: impl IntoIterator<Item = Link>) -> Self {
         self.links.extend(links);
@@ -190,20 +189,20 @@ impl Chain {
         self
     }
 
-    /// The links, in the order from torque to record.
+    /// The links in order from torque to record.
     #[must_use]
     pub fn links(&self) -> &[Link] {
         &self.links
     }
 
-    /// Whether a response over frequency describes it, down to rest.
+    /// Whether a frequency response describes the chain completely, down to DC.
     #[must_use]
     pub fn is_a_response(&self) -> bool {
         let regular = |link: &Link| link.is_linear() && link.dies_out(&self.stand);
         self.links.iter().all(regular)
     }
 
-    /// Links that are taken back together, in order; disturbances are not among them.
+    /// Links that are inverted together, in order, without disturbances.
     #[must_use]
     pub fn groups(&self) -> Vec<Group<'_>> {
         let mut groups = Vec::new();
@@ -221,7 +220,7 @@ impl Chain {
         groups
     }
 
-    /// What some of the linear links make of what comes to them, at a frequency.
+    /// Combined response of a selection of the linear links at a frequency.
     #[must_use]
     pub fn response_of(&self, frequency_hz: f64, some: impl Fn(&Link) -> bool) -> Complex64 {
         let mut through = self.stand.response(TAU * frequency_hz);
@@ -263,8 +262,8 @@ impl Chain {
         linear().fold(plain.inv(), along).inv()
     }
 
-    /// What a torque of one at the gage has the effect of, as an applied quantity over the gain, by frequency in Hz: 1 in a
-    /// stand with one mode, where both act on the same inertia.
+    /// Applied quantity equivalent to a unit torque at the gage, over the gain, by frequency in Hz: 1 in a stand with
+    /// one mode, where both act on the same inertia.
     pub fn torque_as_applied(&self) -> impl Fn(f64) -> Complex64 + '_ {
         let at_gage = match self.stand.only() {
             Some(_) => None,
@@ -277,8 +276,8 @@ impl Chain {
         }
     }
 
-    /// What torques of the stand add to the record through couplings past it, at a frequency, if there are any among
-    /// these links.
+    /// Contribution of the stand's torques to the record through couplings past it, at a frequency; `None` without
+    /// such a coupling among these links.
     #[must_use]
     pub fn coupling<'a>(&'a self, some: &'a [&Link]) -> Option<impl Fn(f64) -> Complex64 + 'a> {
         let any = some.iter().any(|link| link.is_feedthrough());

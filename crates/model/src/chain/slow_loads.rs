@@ -1,4 +1,4 @@
-//! What a stand shows of loads that are put on slowly.
+//! Response of a stand to loads applied slowly.
 
 use num_complex::Complex64;
 
@@ -8,22 +8,23 @@ use crate::modal::{ModalPart, ModalResponse};
 use crate::mode::Mode;
 use crate::simulate::{Excitation, MotionProgress, MotionState, OngoingMotion, integrate};
 
-/// Periods of the slowest mode over which a load changes to the next.
+/// Duration of the change from one load to the next, in periods of the slowest mode.
 const CHANGES: f64 = 2.0;
-/// Such periods that it then stays: what is left of a step with critical damping is `e^(−6π)`, 6e-9 of it.
+/// Dwell at each load, in the same periods; a step with critical damping has decayed to `e^(−6π)` = 6e-9.
 const RESTS: f64 = 3.0;
-/// Samples in a period of the fastest mode.
+/// Samples per period of the fastest mode.
 const PER_PERIOD: f64 = 40.0;
-/// Steps of integration from sample to sample: where a torque bends, the place of rest errs by the square of the step, by 1e-4 of it with
-/// two and 2e-6 with sixteen.
+/// Integration steps per sample: where a torque has a kink, the error of the equilibrium goes with the square of the
+/// step, 1e-4 of it with two and 2e-6 with sixteen.
 const SUBSTEPS: usize = 16;
 
 impl Chain {
-    /// The record under each of some loads, put on one after the other from no load on, so slowly that nothing swings: dry friction
-    /// and play remember the loads before. What a linear link makes of it is its response at rest; lines and drifts are not in it.
+    /// The record under each of several loads, applied one after the other starting from no load, quasi-statically: dry
+    /// friction and backlash depend on the preceding loads. Linear links act with their static gain; lines and drifts
+    /// are omitted.
     ///
-    /// The equations are those of [`simulate`](Self::simulate) with critical damping, which changes nothing at rest, and with a
-    /// smooth change `10 s³ − 15 s⁴ + 6 s⁵` from load to load. A motion that leaves all bounds is NaN.
+    /// Same equations as [`simulate`](Self::simulate), with critical damping, which does not affect the equilibrium,
+    /// and a smooth transition `10 s³ − 15 s⁴ + 6 s⁵` from load to load. NaN if the motion diverges.
     ///
     /// ```
     /// use torqcomp_model::{Chain, Link, Mode, effects::Effect};
@@ -43,7 +44,7 @@ impl Chain {
             true => self.settled(loads),
             false => loads.iter().map(|load| self.gain * load).collect(),
         };
-        // No time passes for what drifts.
+        // No time passes, so drifts have no effect.
         let clock = SampleClock { step_s: 0.0 };
         for link in self.links.iter().filter(|link| link.stage > Stage::Stand) {
             match &link.action {
@@ -62,7 +63,7 @@ impl Chain {
         record
     }
 
-    /// What the gage shows of the motion at the end of each load.
+    /// Gage signal at the end of each load.
     fn settled(&self, loads: &[f64]) -> Vec<f64> {
         let damped = |part: &ModalPart| ModalPart {
             mode: Mode {
@@ -98,14 +99,15 @@ impl Chain {
     }
 }
 
-/// Multiplies samples with a response at rest, which is real.
+/// Scales samples by a static response, which is real.
 fn scale(samples: &mut [f64], response: Complex64) {
     for sample in samples {
         *sample *= response.re;
     }
 }
 
-/// The course of the load: from no load, each changes smoothly to the next within so many samples and stays for so many.
+/// Load history: starting from no load, each load is approached smoothly within `changes` samples and kept for `rests`
+/// samples.
 fn course(loads: &[f64], changes: usize, rests: usize) -> Vec<f64> {
     let before = std::iter::once(&0.0).chain(loads);
     let to_next = before.zip(loads).flat_map(|(from, to)| {
@@ -144,8 +146,8 @@ mod tests {
 
     #[test]
     fn dry_friction_holds_back_whichever_way_it_goes() {
-        // A torque of 0.5 against the motion: the spring takes 0.5 less on the way up, and 0.5 more on the way down; it does not
-        // move for less than twice that.
+        // Friction of 0.5 opposes the motion: the spring carries 0.5 less on the way up and 0.5 more on the way down;
+        // the stand does not move for a change of less than twice that.
         let shown = stand("coulomb-friction", &[0.5])
             .under_slow_loads(&[0.4, 1.0, 3.0, 2.5, 2.0, 1.0, 0.0, -1.0]);
         assert_near(&shown, &[0.0, 0.5, 2.5, 2.5, 2.5, 1.5, 0.5, -0.5]);
@@ -157,7 +159,7 @@ mod tests {
         let gain = || Link::of(effect, &effect.forms[0], &[0.1]);
         let plain = Chain::new(MODE, 2.0).with_links([gain()]);
         assert_near(&plain.under_slow_loads(&[1.0, -2.0]), &[2.2, -4.4]);
-        // An amplifier that is coupled through a capacitor shows no load that stays.
+        // An AC-coupled amplifier does not show a static load.
         let effect = Effect::named("capacitive-coupling").expect("an effect");
         let form = effect.form(Some("ac-coupled")).expect("a form");
         let coupled = Chain::new(MODE, 2.0).with_links([Link::of(effect, form, &[1.0])]);
@@ -166,8 +168,8 @@ mod tests {
 
     #[test]
     fn modes_that_bend_together() {
-        // Of 1 N m at the gage the first mode takes 0.75 and the second 0.25 of the displacement; with the torque x³/4 they
-        // come to rest where x + x³/4 = u, however the modes share it.
+        // Under 1 N m at the gage the first mode contributes 0.75 and the second 0.25 of the displacement; with the
+        // torque x³/4 the equilibrium is x + x³/4 = u, however the modes share it.
         let part = |omega_rad_s: f64, residue| ModalPart {
             mode: Mode {
                 omega_rad_s,

@@ -1,4 +1,4 @@
-//! What an effect does, forwards to the record and back to what was applied.
+//! Action of an effect on the record, and its inverse.
 
 use std::sync::Arc;
 
@@ -10,10 +10,11 @@ use crate::modal::ModalResponse;
 /// A function of the plain stand and the angular frequency in rad/s.
 pub type Frequency = Box<dyn Fn(&ModalResponse, f64) -> Complex64 + Send + Sync>;
 
-/// A response that is known and not fitted, such as that of the recorder: of the frequency in Hz.
+/// A known response that is not fitted, such as that of the recorder, as a function of frequency in
+/// Hz.
 pub type Fixed = Arc<dyn Fn(f64) -> Complex64 + Send + Sync>;
 
-/// Times of samples since their record began: what drifts begins anew with each record, whatever its time stamps say.
+/// Times of samples from the start of their record: drift starts anew in each record, whatever its time stamps say.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SampleClock {
     /// Time between samples in s.
@@ -21,7 +22,7 @@ pub struct SampleClock {
 }
 
 impl SampleClock {
-    /// Time of a sample in s.
+    /// Time of a sample in s from the start of the record.
     #[must_use]
     pub fn time_s(&self, index: usize) -> f64 {
         index as f64 * self.step_s
@@ -30,33 +31,34 @@ impl SampleClock {
 
 /// What an effect does.
 pub enum Action {
-    /// A torque in the stand; in the gage's path, the gage shows it together with `x`.
+    /// A torque in the stand; in the gage's load path, the gage shows it together with `x`.
     Torque {
         /// The torque.
         torque: Box<dyn Torque>,
-        /// Whether it bends the part that the gage sits on.
+        /// Whether it strains the part that carries the gage.
         in_gage_path: bool,
     },
     /// A factor of the response.
     Factor(Frequency),
-    /// A term of the response, past the stand: recorded at once what is applied.
+    /// A term of the response past the stand: the applied quantity couples directly into the
+    /// record.
     Feedthrough(Frequency),
-    /// The recorder as far as it is known, a factor of the response.
+    /// The known response of the recorder, a factor.
     Recorder {
         /// Its response.
         response: Fixed,
-        /// Whether it changes nothing.
+        /// Whether it has no effect.
         is_ideal: bool,
     },
-    /// A change of the recorded samples.
+    /// A distortion of the recorded samples.
     Distortion(Box<dyn Distortion>),
-    /// Lines added.
+    /// Added spectral lines.
     Lines(Vec<SpectralLine>),
-    /// A slow course added, that belongs to the record: as many half waves over its length as it may have.
+    /// An added slow trend that belongs to the record, with at most this many half waves over its length.
     Course(usize),
 }
 
-/// What a compensation does about an effect.
+/// Treatment of an effect in a compensation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Treatment {
     /// The spectrum is divided by its response.
@@ -65,9 +67,9 @@ pub enum Treatment {
     Subtracted,
     /// Its equation is solved.
     Inverted,
-    /// Its torque is integrated along the measured motion.
+    /// Its torque is evaluated along the measured motion.
     Integrated,
-    /// The samples that it spoils are marked.
+    /// The affected samples are marked.
     Marked,
 }
 
@@ -85,89 +87,89 @@ impl Treatment {
     }
 }
 
-/// Samples that do not determine what was there before a distortion.
+/// Samples whose original value the distorted record does not determine.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Unrecovered {
-    /// What it is about them.
+    /// Reason.
     pub why: String,
-    /// Their indices, in order.
+    /// Their indices in ascending order.
     pub samples: Vec<usize>,
 }
 
-/// A change of the recorded samples in place, both ways.
+/// A distortion of the recorded samples in place, and its inverse.
 pub trait Distortion: Send + Sync {
-    /// Applies it.
+    /// Applies the distortion.
     fn forward(&self, clock: SampleClock, samples: &mut [f64]);
 
-    /// Takes it back, in the presence of noise of that standard deviation; the samples of which the record does not
-    /// tell enough.
+    /// Inverts the distortion, for noise of standard deviation `noise_std`; returns the samples that cannot be
+    /// recovered.
     fn inverse(&self, clock: SampleClock, noise_std: f64, samples: &mut [f64]) -> Unrecovered;
 
-    /// What its inverse is.
+    /// Treatment in a compensation.
     fn treatment(&self) -> Treatment {
         Treatment::Inverted
     }
 
-    /// Whether it takes each sample by itself, without memory of others and whatever the time.
+    /// Whether it acts on each sample alone, without memory or dependence on time.
     fn is_pointwise(&self) -> bool {
         false
     }
 }
 
-/// What a torque remembers from node to node.
+/// Memory of a torque, carried from node to node.
 pub type Memory = [f64; 2];
 
 /// A torque `n(x, x', z)` in units of the record, in `x'' + 2ζω₀ x' + ω₀² (x + n) = ω₀² G u`.
 ///
-/// The way back evaluates it along the measured motion: [`Torque::blurred`], and in the gage's path
-/// [`Torque::hidden`].
+/// The inverse evaluates it along the measured motion: [`Torque::blurred`], and in the gage's load
+/// path [`Torque::hidden`].
 pub trait Torque: Send + Sync {
-    /// The torque at a state; what is remembered moves on to it.
+    /// The torque at a state; advances the memory.
     fn value(&self, memory: &mut Memory, x: f64, speed: f64) -> f64;
 
-    /// The mean torque where the speed is known up to a standard uncertainty only: what switches with the sign of
-    /// the speed does so gradually.
+    /// Mean torque for a speed with a standard uncertainty: switching with the sign of the speed becomes gradual.
     fn blurred(&self, memory: &mut Memory, x: f64, speed: f64, speed_std: f64) -> f64 {
         let _ = speed_std;
         self.value(memory, x, speed)
     }
 
-    /// Half the range of `x` about zero in which a gage that shows `x + n` shows nothing.
+    /// Half-width of the range of `x` about zero in which a gage that shows `x + n` reads zero.
     fn hidden(&self) -> f64 {
         0.0
     }
 
-    /// The speed after the torque has acted for a short time, in which `x` stays:
-    /// `impulse = ω₀² h`. `change` is what the speed changed by since the last node: a torque that
-    /// switches with the sign of the speed does so somewhere in between.
+    /// The speed after the torque has acted for a short time with `x` constant: `impulse = ω₀² h`.
+    /// `change` is the change of speed since the last node: a torque that switches with the sign of
+    /// the speed does so somewhere in between.
     fn kick(&self, memory: &mut Memory, x: f64, speed: f64, change: f64, impulse: f64) -> f64 {
         let _ = change;
         speed - impulse * self.value(memory, x, speed)
     }
 
-    /// Its stiffness at small displacements, relative to that of the plain stand, where it has one: a fit that begins
-    /// with it takes it off the plain stand.
+    /// Its stiffness at small displacements, relative to that of the plain stand; a fit that adds the torque starts
+    /// with the plain stand's stiffness reduced by it.
     fn stiffness(&self) -> f64 {
         0.0
     }
 
-    /// The size of a sharp dry friction in it: the integration looks for the moments in which that switches. [`Torque::kick`]
-    /// is then what the rest of the torque does, which is smooth and zero at rest.
+    /// Magnitude of its sharp dry friction, if any: the integration locates the moments at which that switches.
+    /// [`Torque::kick`] then covers only the rest of the torque, which is smooth and zero at rest.
     fn dry(&self) -> Option<f64> {
         None
     }
 
-    /// Whether it switches with the direction of the motion: where that is unknown, so is the torque.
+    /// Whether it switches with the direction of motion: where the direction is unknown, so is the
+    /// torque.
     fn switches(&self) -> bool {
         false
     }
 
-    /// Whether the torque depends on where zero is: a constant load then matters.
+    /// Whether the torque depends on the zero of displacement, so that a constant load matters.
     fn has_zero(&self) -> bool {
         false
     }
 
-    /// What is remembered at the start.
+    /// Initial memory.
     fn begin(&self, x: f64) -> Memory {
         let _ = x;
         [0.0; 2]
@@ -175,7 +177,7 @@ pub trait Torque: Send + Sync {
 }
 
 impl Action {
-    /// A torque beside what the gage shows.
+    /// A torque that the gage does not show.
     #[must_use]
     pub fn beside(torque: impl Torque + 'static) -> Self {
         Self::Torque {
@@ -193,7 +195,7 @@ impl Action {
         }
     }
 
-    /// What a compensation does about it.
+    /// Treatment in a compensation.
     #[must_use]
     pub fn treatment(&self) -> Treatment {
         match self {

@@ -1,13 +1,13 @@
-//! Play between stator and beam.
+//! Backlash between stator and beam.
 //!
-//! `gap`: within `±g` of its middle the beam is not touched, `n = −clamp(x, −g, g)`, and the gage shows nothing
-//! (`gap-beside`: the gage follows the displacement all the same). `soft-gap`: something
-//! softer carries within it, `n = −r clamp(x, −g, g)`; with `g` far out this would be an end stop, so `g` is bounded. `joint`: the beam follows the stator with play,
-//! `n = w − x` with `w` dragged along at a distance of at most `g` (the play operator of M. A. Krasnoselskii, A. V.
-//! Pokrovskii, *Systems with Hysteresis* (1989)). `recorded`: the same play, in what the gage is moved by
-//! only. M. Nordin, P.-O. Gutman, *Controlling mechanical systems with backlash*, Automatica 38 (2002), 1633.
-//! **Valid for stiff flanks without impact losses.** Mistaken for `coulomb-friction`, `bouc-wen-hysteresis`, and at
-//! one level for `cubic-stiffness`.
+//! `gap`: within `±g` of the centre the beam is not touched, `n = −clamp(x, −g, g)`, and the gage shows nothing
+//! (`gap-beside`: the gage still follows the displacement). `soft-gap`: a softer contact carries within it,
+//! `n = −r clamp(x, −g, g)`; with a large `g` this would be an end stop, so `g` is bounded. `joint`: the beam follows
+//! the stator with backlash, `n = w − x` with `w` dragged along at a distance of at most `g` (the play operator of M.
+//! A. Krasnoselskii, A. V. Pokrovskii, *Systems with Hysteresis* (1989)). `recorded`: the same backlash, but only in
+//! what drives the gage. M. Nordin, P.-O. Gutman, *Controlling mechanical systems with backlash*, Automatica 38 (2002),
+//! 1633. **Valid for stiff flanks without impact losses.** Mistaken for `coulomb-friction`, `bouc-wen-hysteresis`, and
+//! at one level for `cubic-stiffness`.
 
 use super::{
     Action, Distortion, Effect, EffectParameter, Form, Memory, SampleClock, Stage, Torque,
@@ -15,7 +15,7 @@ use super::{
 };
 
 const GAP: EffectParameter = EffectParameter::motion("gap", 1, 0, 0.0, 3.0);
-/// With the gap far out, this would be an end stop beside the beam.
+/// A larger gap would be an end stop beside the beam.
 const SMALL_GAP: EffectParameter = EffectParameter::motion("gap", 1, 0, 0.0, 0.8);
 const SOFTENING: EffectParameter = EffectParameter::number("softening", 0.0, 1.0);
 const GAPS: &[&[f64]] = &[&[0.005], &[0.02], &[0.1], &[0.4]];
@@ -103,7 +103,7 @@ impl Torque for Gap {
     }
 
     fn hidden(&self) -> f64 {
-        // A soft gap shows its inside, if weakly.
+        // Within a soft gap the gage still shows a weak signal.
         if self.share < 1.0 { 0.0 } else { self.gap }
     }
 
@@ -112,8 +112,8 @@ impl Torque for Gap {
     }
 }
 
-/// A follower brought within the gap around `x`. A motion that diverges while constants are tried has no value at last:
-/// `clamp` would panic there.
+/// A follower dragged to within `gap` of `x`. `x` may be NaN when trial parameters make the motion diverge, and `clamp`
+/// would panic then.
 fn within(follower: f64, x: f64, gap: f64) -> f64 {
     follower.max(x - gap).min(x + gap)
 }
@@ -133,7 +133,7 @@ impl Torque for Joint {
     }
 }
 
-/// Play in what moves the gage.
+/// Backlash in what drives the gage.
 struct Play {
     gap: f64,
 }
@@ -155,13 +155,13 @@ impl Distortion for Play {
     }
 }
 
-/// Noise, in standard deviations, that a turning point must exceed.
+/// Least turning point, in standard deviations of the noise.
 const TURN: f64 = 4.0;
-/// Smallest turn, as a part of the play.
+/// Least turning point, relative to the backlash.
 const SMALLEST: f64 = 1e-3;
 
-/// Takes play of half-width `gap` back, `x = y ± g` while the gage is moved and on the way from one flank to the other
-/// a parabola, as a motion near its turning point is; the samples at which the gage stood still.
+/// Inverts backlash of half-width `gap`: `x = y ± g` while the gage moves and, from one flank to the other, a
+/// parabola, as a motion is near its turning point. Returns the samples at which the gage stood still.
 fn without_play(samples: &mut [f64], gap: f64, noise_std: f64) -> Vec<usize> {
     let width = (TURN * noise_std).max(SMALLEST * gap);
     let turns = turns(samples, width);
@@ -187,19 +187,19 @@ fn without_play(samples: &mut [f64], gap: f64, noise_std: f64) -> Vec<usize> {
     bridged
 }
 
-/// A stretch over which the gage stood still while the play was gone through.
+/// An interval in which the gage stood still while the gap was crossed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Turn {
-    /// First and last sample at rest.
+    /// First sample at rest.
     from: usize,
     to: usize,
     /// Direction before it: 1 or −1.
     before: f64,
-    /// Where the gage stood.
+    /// Gage reading at rest.
     at: f64,
 }
 
-/// Turning points of a signal that exceed a width.
+/// Turning points of a signal that exceed `width`.
 fn turns(samples: &[f64], width: f64) -> Vec<Turn> {
     let mut turns = Vec::new();
     let mut direction = 0.0;
@@ -227,7 +227,7 @@ fn turns(samples: &[f64], width: f64) -> Vec<Turn> {
     turns
 }
 
-/// How long a signal stood still around an extreme: within the width of it.
+/// The interval around an extreme in which the signal stays within `width` of it.
 fn rest(samples: &[f64], before: f64, extreme: usize, width: f64) -> Turn {
     let end = samples[extreme];
     let still = |i: &usize| (end - samples[*i]) * before <= width;
@@ -240,7 +240,7 @@ fn rest(samples: &[f64], before: f64, extreme: usize, width: f64) -> Turn {
         .take_while(still)
         .last()
         .unwrap_or(extreme);
-    // In noise the extreme is the largest of many; the gage stood where most of them are.
+    // In noise the extreme is the largest of many samples, so the mean estimates the resting value.
     let at = samples[from..=to].iter().sum::<f64>() / (to + 1 - from) as f64;
     Turn {
         from,
@@ -250,8 +250,8 @@ fn rest(samples: &[f64], before: f64, extreme: usize, width: f64) -> Turn {
     }
 }
 
-/// Where the gage shows nothing, `|y| ≤ nothing`, leads the displacement from side to side by a cubic with the slopes at
-/// both ends, and marks the samples as unknown.
+/// Bridges the intervals where the gage shows nothing, `|y| ≤ nothing`, by a cubic that matches the slopes at both
+/// ends, and marks the samples as unknown.
 pub(crate) fn bridge(x: &mut [f64], unknown: &mut [bool], signal: &[f64], nothing: f64) {
     let inside = |y: &f64| y.abs() <= nothing;
     let mut i = 0;
@@ -272,7 +272,7 @@ pub(crate) fn bridge(x: &mut [f64], unknown: &mut [bool], signal: &[f64], nothin
     }
 }
 
-/// The cubic between two places with the slopes at both of them.
+/// Cubic interpolation between two samples, matching the slopes at both.
 fn cubic(x: &mut [f64], from: usize, to: usize) {
     let length = (to - from) as f64;
     let (a, b) = (x[from], x[to]);

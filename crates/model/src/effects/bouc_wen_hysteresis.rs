@@ -1,18 +1,18 @@
-//! Hysteresis with memory, smooth, of joints and clamps.
+//! Smooth hysteresis of joints and clamps.
 //!
-//! `n = k z`, `z' = x' − (b |x'| z + c x' |z|)` (`linear`; `shown`: the gage shows it), or with `m` in place of 1
-//! (`exponent`): `z' = x' − |s z|^m (b |x'| sgn z + c x')/s`, `s = b + |c|`. In `part` and `exponent-part` a share of the
-//! stand's own stiffness has it, `n = k (z − x)`: the record is then the whole stiffness times the displacement. Y. K. Wen, *Method for random vibration of
-//! hysteretic systems*, J. Eng. Mech. Div. 102 (1976), 249. **Valid without drift of the loops**; does
-//! not close small inner loops as metals do. Mistaken for `coulomb-friction` (its limit for a stiff joint),
-//! `structural-damping` at one level.
+//! `n = k z`, `z' = x' − (b |x'| z + c x' |z|)` (`linear`; `shown`: the gage shows it), or with exponent `m` instead of
+//! 1 (`exponent`): `z' = x' − |s z|^m (b |x'| sgn z + c x')/s`, `s = b + |c|`. In `part` and `exponent-part` a share of
+//! the stand's own stiffness is hysteretic, `n = k (z − x)`: the record is then the whole stiffness times the
+//! displacement. Y. K. Wen, *Method for random vibration of hysteretic systems*, J. Eng. Mech. Div. 102 (1976), 249.
+//! **Valid without drift of the loops**; does not close small inner loops as metals do. Mistaken for `coulomb-friction`
+//! (its limit for a stiff joint), `structural-damping` at one level.
 //!
-//! The law does not depend on rate: `z` follows the steps of `x`, by the midpoint rule.
+//! The law is rate-independent: `z` follows the steps of `x`, by the midpoint rule.
 
 use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 
 const PART: EffectParameter = EffectParameter::number("stiffness_ratio", 0.0, 50.0);
-/// Without loss the loops are closed: what is left is a bent spring.
+/// Without loss the loops are closed, and only a nonlinear spring remains.
 const LOSS: EffectParameter = EffectParameter::motion("loss", -1, 0, 0.0, 100.0).essential();
 const SHAPE: EffectParameter = EffectParameter::motion("shape", -1, 0, -100.0, 100.0);
 const SHARE: EffectParameter = EffectParameter::number("stiffness_share", 0.0, 1.0);
@@ -116,7 +116,7 @@ impl BoucWen {
         if self.exponent == 1.0 {
             return 1.0 - size * sum;
         }
-        // One scale of z for loss and shape keeps the two comparable for any exponent.
+        // A common scale of z for loss and shape keeps the two comparable for any exponent.
         let scale = self.loss + self.shape.abs();
         if scale == 0.0 {
             return 1.0;
@@ -143,7 +143,7 @@ impl Torque for BoucWen {
     }
 }
 
-/// StiffnessShare of the stand's own stiffness has the hysteresis: `n = k (z − x)`.
+/// A share of the stand's own stiffness is hysteretic: `n = k (z − x)`.
 struct StiffnessShare {
     whole: BoucWen,
 }
@@ -162,7 +162,7 @@ impl Torque for StiffnessShare {
     }
 
     fn begin(&self, x: f64) -> Memory {
-        // A joint that has not slipped yet.
+        // The joint has not slipped yet.
         [x, x]
     }
 }

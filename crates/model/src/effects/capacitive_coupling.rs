@@ -1,9 +1,9 @@
 //! A stray or series capacitance in the measuring chain.
 //!
-//! `slope-of-load`: `y = x + G τ u'`, the load's own slope gets into the record; at a load step it is the
-//! spike that the thesis puts down to "capacitive coupling within the recorder". `slope-of-record`:
-//! `y = x + τ x'`. `high-pass-leak`: `y = x + c s τ/(1 + s τ) G u`. `ac-coupled`: `y = s/(s + ω_c) x`, a series capacitor.
-//! **Valid far below the corner of the stray path** for the first two. Mistaken for `second-mode` below the excitation,
+//! `slope-of-load`: `y = x + G τ u'`, the derivative of the load couples into the record; at a load step it is the
+//! spike that the thesis attributes to "capacitive coupling within the recorder". `slope-of-record`: `y = x + τ x'`.
+//! `high-pass-leak`: `y = x + c s τ/(1 + s τ) G u`. `ac-coupled`: `y = s/(s + ω_c) x`, a series capacitor. **Valid far
+//! below the corner of the stray path** for the first two. Mistaken for `second-mode` below the excitation,
 //! `time-delay` of the other channel.
 
 use super::{Action, Effect, EffectParameter, Form, Stage};
@@ -53,7 +53,7 @@ pub(super) static EFFECT: Effect = Effect {
             law: "y = x + c s tau/(1 + s tau) G u, tau = 1/(2 pi corner)",
             stage: Stage::Chain,
             parameters: &[
-                // A small capacitor has a corner far above the band, and much of it passes there.
+                // A small capacitor has its corner far above the band, so the share may be large.
                 EffectParameter::number("share", -100.0, 100.0),
                 EffectParameter::frequency("corner", 0.01, 300.0),
             ],
@@ -70,7 +70,8 @@ pub(super) static EFFECT: Effect = Effect {
             name: "ac-coupled",
             law: "y = s/(s + 2 pi corner) x",
             stage: Stage::Chain,
-            // Below, a record of a thousand periods shows no corner but a slope, which is a drift.
+            // Below this bound, a record of a thousand periods shows a slope instead of a corner,
+            // which is a drift.
             parameters: &[EffectParameter::frequency("corner", 1e-4, 3.0).fading()],
             starts: &[&[0.003], &[0.05], &[0.3]],
             build: |p| {
@@ -84,8 +85,8 @@ pub(super) static EFFECT: Effect = Effect {
     ],
 };
 
-/// Takes off the slope that comes in where a link that passes no constant is divided out: what it blocked is known but
-/// for a constant at either end.
+/// Removes the slope introduced by dividing out a link that blocks constants: what it blocked is known except for a
+/// constant at either end.
 pub fn level(before: &[f64], after: &mut [f64]) {
     if after.len() < 2 {
         return;

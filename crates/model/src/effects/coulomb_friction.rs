@@ -1,14 +1,14 @@
-//! Dry friction: a torque of constant size against the motion.
+//! Dry friction: a torque of constant magnitude opposing the motion.
 //!
-//! `n = F sgn(x')`, with sticking (`sharp`), or `n = F tanh(x'/v)` (`tanh`). C. A. Coulomb,
-//! *Théorie des machines simples* (1781). **Valid where sliding is full**; before that a joint gives a
-//! hysteresis with memory. Mistaken for `bouc-wen-hysteresis` and `quadratic-damping`.
+//! `n = F sgn(x')`, with sticking (`sharp`), or `n = F tanh(x'/v)` (`tanh`). C. A. Coulomb, *Théorie des machines
+//! simples* (1781). **Valid for gross sliding**; before that a joint shows hysteresis with memory. Mistaken for
+//! `bouc-wen-hysteresis` and `quadratic-damping`.
 //!
-//! Integration: `sharp` friction is a constant torque between the moments in which the speed is zero, which are looked
-//! for; there the stand sticks if the other torques do not exceed the friction. For `tanh`, with `x` fixed, the
-//! speed follows `x'' = −ω₀² F tanh(x'/v)` exactly, `sinh(x'/v) ∝ e^{−ω₀² F t/v}`, which cannot overshoot zero; where
-//! the speed changes sign between two nodes, `v` is taken no less than half the change, so that the sum over
-//! the nodes has the friction switch at the right time.
+//! Integration: `sharp` friction is a constant torque between the zero crossings of the speed, which are located;
+//! there the stand sticks if the other torques do not exceed the friction. For `tanh`, with `x` constant, the speed
+//! follows `x'' = −ω₀² F tanh(x'/v)` exactly, `sinh(x'/v) ∝ e^{−ω₀² F t/v}`, which cannot overshoot zero; where the
+//! speed changes sign between two nodes, `v` is at least half the change, so that the sum over the nodes switches the
+//! friction at the right time.
 
 use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 
@@ -60,7 +60,7 @@ pub(super) static EFFECT: Effect = Effect {
     ],
 };
 
-/// Friction of constant size, smoothed over a range of speeds.
+/// Friction of constant magnitude, smoothed over a range of speeds.
 pub(super) struct Friction {
     pub(super) torque: f64,
     pub(super) speed: f64,
@@ -85,7 +85,7 @@ impl Torque for Friction {
         true
     }
 
-    /// `F tanh(x'/√(v² + πσ²/2))`: for `v = 0` it has the slope that the mean of `sgn` has at zero.
+    /// `F tanh(x'/√(v² + πσ²/2))`: for `v = 0` its slope at zero is that of the mean of `sgn`.
     fn blurred(&self, memory: &mut Memory, x: f64, speed: f64, speed_std: f64) -> f64 {
         let width = (0.5 * std::f64::consts::PI).sqrt() * speed_std;
         if width == 0.0 {
@@ -96,7 +96,7 @@ impl Torque for Friction {
 
     fn kick(&self, _: &mut Memory, _: f64, speed: f64, change: f64, impulse: f64) -> f64 {
         if self.speed == 0.0 {
-            // All of it is the dry friction that the integration looks after.
+            // The integration handles all of it, as dry friction.
             return speed;
         }
         let width = self.speed.max(0.5 * change.abs());
@@ -109,8 +109,8 @@ impl Torque for Friction {
     }
 }
 
-/// `asinh(sinh(a) e^{−b})` for `a ≥ 0`, also where `sinh(a)` would overflow. It is at work in every step of hundreds of fits:
-/// with the library's own `sinh` and `asinh`, a diagnosis takes half as long again.
+/// `asinh(sinh(a) e^{−b})` for `a ≥ 0`, also where `sinh(a)` would overflow. It runs in every step of hundreds of fits:
+/// with the standard library's `sinh` and `asinh`, a diagnosis takes half as long again.
 fn decay(a: f64, b: f64) -> f64 {
     if a.min(a - b) > LARGE {
         return a - b;
@@ -129,9 +129,10 @@ fn decay(a: f64, b: f64) -> f64 {
     }
 }
 
-/// Below it, four terms of the series of `sinh` and `asinh` are exact to 1e-14; logarithm and difference lose no more there.
+/// Below it, four terms of the series of `sinh` and `asinh` are exact to 1e-14; above it, cancellation in logarithm and
+/// difference costs no more than that.
 const SMALL: f64 = 0.03;
-/// Above it, `sinh` is half the exponential to the last bit.
+/// Above it, `sinh` equals half the exponential to the last bit.
 const LARGE: f64 = 20.0;
 
 /// `x (1 + c₀ x² (1 + c₁ x² (1 + c₂ x²)))`.

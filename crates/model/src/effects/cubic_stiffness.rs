@@ -2,9 +2,9 @@
 //!
 //! `n = c x³`: for a torque stand `K θ + k₃ θ³` with `c = k₃/K³`. `beside`: the gage shows `K θ` (the strain follows
 //! the displacement); `shown`: it shows the whole torque of the beam, `x + n`. G. Duffing, *Erzwungene Schwingungen
-//! bei veränderlicher Eigenfrequenz* (1918). **Valid while the next odd power is small**: an end stop or
-//! a gap, which sets in at one displacement, is not cubic. Mistaken for `gage-nonlinearity` of the same
-//! power, which bends the record and not the motion, at low level for `quadratic-stiffness`.
+//! bei veränderlicher Eigenfrequenz* (1918). **Valid while the next odd power is small**: an end stop or a gap,
+//! which sets in at one displacement, is not cubic. Mistaken for `gage-nonlinearity` of the same power, which
+//! distorts the record and not the motion, at low level for `quadratic-stiffness`.
 
 use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 

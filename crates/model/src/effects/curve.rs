@@ -1,21 +1,21 @@
-//! Curves of the measuring chain: a law `y = f(x)` that acts sample by sample, and its inverse around zero.
+//! Static characteristics of the measuring chain: a law `y = f(x)` for each sample, and its inverse around
+//! zero.
 
 use super::{Action, Distortion, SampleClock, Unrecovered};
 
-/// Steepest part of an inverse curve that is followed: beyond, a sample says more about its noise than about the
-/// signal.
+/// Steepest slope of an inverse curve that is used; beyond it the noise gain is too high.
 const STEEPEST: f64 = 10.0;
-/// Places on either side of zero at which a curve is looked at.
+/// Points on either side of zero at which a curve is evaluated.
 const PLACES: usize = 2000;
-/// Halvings that find the end of a branch.
+/// Bisections to find the end of a branch.
 const HALVINGS: usize = 40;
-/// Part of the largest sample by which a sample may be off after the curve has been gone back and forth.
+/// Largest error of a round trip through a curve, relative to the largest sample.
 const BACK_AND_FORTH: f64 = 1e-6;
 
 /// A curve.
 struct Curve<F, G> {
     law: F,
-    /// Inverse on the branch around zero; anything beyond it.
+    /// Inverse on the branch around zero; arbitrary beyond it.
     inverse: G,
 }
 
@@ -42,7 +42,7 @@ where
         true
     }
 
-    /// On the rising branch around zero; the samples beyond it go on along a straight line.
+    /// Inverts the rising branch around zero; beyond it, extrapolates along a straight line.
     fn inverse(&self, _: SampleClock, _: f64, samples: &mut [f64]) -> Unrecovered {
         let largest = samples.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         let ends = [-largest, largest].map(|end| self.branch_end(end));
@@ -67,7 +67,7 @@ where
 }
 
 impl<F: Fn(f64) -> f64, G: Fn(f64) -> f64> Curve<F, G> {
-    /// How far from zero towards an end the curve can be inverted.
+    /// Distance from zero, in the direction of `end`, up to which the curve can be inverted.
     fn branch_end(&self, end: f64) -> f64 {
         let step = 1e-6 * end.abs();
         let good = |y: f64| {

@@ -1,11 +1,10 @@
-//! A stop that the beam hits: beyond a displacement something else carries too.
+//! An end stop: beyond a displacement, a second contact carries load too.
 //!
-//! `n = k (x − clamp(x, −g, g))`, or beyond `g` to one side only; with losses the contact adds `c x'` while it is closed.
-//! S. W. Shaw, P. J. Holmes, *A periodically forced piecewise linear oscillator*, J. Sound Vib. 90 (1983), 129.
-//! **Valid for a contact that stays where it is.** Mistaken for `cubic-stiffness`, `saturation` and
-//! `bouc-wen-hysteresis`.
+//! `n = k (x − clamp(x, −g, g))`, or beyond `g` on one side only; with losses the contact adds `c x'` while closed. S.
+//! W. Shaw, P. J. Holmes, *A periodically forced piecewise linear oscillator*, J. Sound Vib. 90 (1983), 129. **Valid
+//! for a contact that does not move.** Mistaken for `cubic-stiffness`, `saturation` and `bouc-wen-hysteresis`.
 //!
-//! Integration: for a fixed `x` in contact, the speed follows `x'' = −ω₀² (k (x − g) + c x')` exactly.
+//! Integration: for constant `x` in contact, the speed follows `x'' = −ω₀² (k (x − g) + c x')` exactly.
 
 use super::{Action, Effect, EffectParameter, Form, Memory, ParameterScale, Stage, Torque};
 
@@ -137,7 +136,7 @@ impl Stop {
         }
     }
 
-    /// How far a displacement is beyond the stop.
+    /// Penetration of a displacement beyond the stop.
     fn beyond(&self, x: f64) -> f64 {
         x - x.clamp(self.lower, self.upper)
     }

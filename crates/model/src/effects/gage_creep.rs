@@ -1,9 +1,9 @@
-//! Creep of the gage and its bond: under a constant load the record goes on for a while.
+//! Creep of the gage and its bond: under a constant load the record keeps changing for a while.
 //!
-//! `y = x + c x_s`, `x_s` being `x` behind a lag of first order with the time constant `τ = 1/(2π corner)`: what is slow is
-//! shown `1 + c` times, what is fast as it is; `c < 0` where the bond gives way. K. Hoffmann, *An Introduction to Measurements
-//! using Strain Gages* (HBM, 1989), 3.4. **Valid at one temperature.** Mistaken for `thermal-drift` and `ac-coupled` of
-//! `capacitive-coupling`, which is `c = −1`.
+//! `y = x + c x_s`, with `x_s` being `x` through a first-order lag of time constant `τ = 1/(2π corner)`: slow changes
+//! are shown `1 + c` times, fast ones unchanged; `c < 0` where the bond yields. K. Hoffmann, *An Introduction to
+//! Measurements using Strain Gages* (HBM, 1989), 3.4. **Valid at one temperature.** Mistaken for `thermal-drift` and
+//! `ac-coupled` of `capacitive-coupling`, which is `c = −1`.
 
 use std::f64::consts::TAU;
 

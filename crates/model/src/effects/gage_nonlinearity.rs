@@ -1,4 +1,4 @@
-//! A gage or bridge whose output is not in proportion to the strain.
+//! A gage or bridge whose output is not proportional to strain.
 //!
 //! `y = x + a x²` (`square`, the law of a silicon gage, Appendix B of the thesis:
 //! `ΔR/R = GF (T₀/T) ε + C₂ (T₀/T)² ε²`), `y = x + b x³` (`cube`) or both (`both`). **Valid while the curve rises.**
@@ -79,7 +79,7 @@ mod tests {
 
     #[test]
     fn a_fold_ends_the_branch_and_is_reported() {
-        // x + x²/10 has its least value −2.5 at −5; its inverse has slope 10 where 1 + x/5 = 1/10, at −2.475.
+        // The minimum of x + x²/10 is −2.5 at −5; its inverse has slope 10 where 1 + x/5 = 1/10, at −2.475.
         let Action::Distortion(bent) = law(0.1, 0.0) else {
             panic!("not a curve")
         };

@@ -1,8 +1,8 @@
-//! A calibration constant that is wrong.
+//! An error of the calibration constant.
 //!
-//! `y = (1 + e) x`. Only where the static gain is declared (both channels torque, or volts with a
-//! calibration); elsewhere the gain is a parameter of the plain stand. **Valid at all levels and
-//! frequencies alike.** Mistaken for wrong stiffness where only frequencies far above the natural one are excited.
+//! `y = (1 + e) x`. Only where the static gain is declared (both channels torque, or volts with a calibration);
+//! elsewhere the gain is a parameter of the plain stand. **Valid at all levels and frequencies.** Mistaken for
+//! wrong stiffness where only frequencies far above the natural one are excited.
 
 use super::{Action, Effect, EffectParameter, Form, Stage};
 use num_complex::Complex64;

@@ -1,19 +1,20 @@
-//! Lines added to a record: the amplitude belongs to the stand, the phase is found in the record.
+//! Spectral lines added to a record: the amplitude is a property of the stand, the phase is found
+//! in the record.
 
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-/// Distances from a line, in lines of the record's spectrum, at which the signal beside it is looked at: beyond
-/// the window's own width, and over more than the spacing of a usual comb.
+/// Distances from a line, in bins of the record's spectrum, at which the neighbouring signal is estimated:
+/// beyond the main lobe of the window, and over more than the spacing of a typical comb.
 const BESIDE: std::ops::RangeInclusive<u32> = 3..=20;
-/// Variance of the signal at a line, over the square of what the record's own amplitude differs by from that of the
-/// stand, that is thought possible.
+/// Largest plausible variance of the signal at a line, over the squared difference of the record's amplitude
+/// from that of the stand.
 const AGREEMENT: f64 = 8.0;
-/// Samples after which a turning phasor is set right.
+/// Samples between resets of a rotating phasor, which limit its rounding error.
 const TURNS: usize = 4096;
 
-/// A steady line, independent of what is applied; its phase belongs to the record.
+/// A steady line, independent of the input; its phase differs from record to record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpectralLine {
     /// Frequency in Hz.
@@ -23,7 +24,7 @@ pub struct SpectralLine {
 }
 
 impl SpectralLine {
-    /// A frequency in Hz, then the amplitudes of it and of its orders 2, 3, …
+    /// A frequency in Hz, followed by the amplitudes of its orders 1, 2, 3, …
     #[must_use]
     pub fn orders(p: &[f64]) -> Vec<Self> {
         let line = |order: usize| Self {
@@ -34,7 +35,7 @@ impl SpectralLine {
     }
 }
 
-/// A line as it was found in a record.
+/// A line found in a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FoundLine {
     /// Frequency in Hz.
@@ -45,16 +46,16 @@ pub struct FoundLine {
     pub recorded: f64,
     /// Phase of the sine at the record's first sample, in rad.
     pub phase_rad: f64,
-    /// Part of the amplitude that was taken off: 1 where the phase is certain, 0 where the signal hides it.
+    /// Fraction of the amplitude that was subtracted: 1 where the phase is certain, 0 where the signal
+    /// hides it.
     pub share: f64,
 }
 
-/// Takes lines off a record: the amplitude is that of the stand, the phase that of the record.
+/// Subtracts lines from a record, with the amplitude of the stand and the phase of the record.
 ///
-/// With a phasor `P = A e^{jφ} + S`, a known amplitude `A`, an unknown phase and signal `S` of variance `σ²` beside it,
-/// the mean of `A e^{jφ}` is `A I₁(κ)/I₀(κ) e^{j arg P}`, `κ = 2 A |P|/σ²`. `σ²` is the largest
-/// power at the frequencies beside the line, since a comb may have one of its lines there, or less if `|P|` agrees with
-/// `A` better than that.
+/// With a phasor `P = A e^{jφ} + S`, known amplitude `A`, unknown phase, and a signal `S` of variance `σ²`, the mean of
+/// `A e^{jφ}` is `A I₁(κ)/I₀(κ) e^{j arg P}`, `κ = 2 A |P|/σ²`. `σ²` is the largest power at the neighbouring
+/// frequencies, since a comb may have one of its lines there, or less if `|P|` agrees with `A` more closely than that.
 pub fn subtract_lines(
     samples: &mut [f64],
     rate_hz: f64,
@@ -110,7 +111,8 @@ pub fn subtract_lines(
     found
 }
 
-/// `P` of the part `Re(P e^{jωt})`, through a Hann window; the frequency in cycles a sample.
+/// Phasor `P` of the component `Re(P e^{jωt})`, with a Hann window; the frequency in cycles per
+/// sample.
 fn phasor(samples: &[f64], cycles: f64) -> Complex64 {
     let count = samples.len() as f64;
     let mean = samples.iter().sum::<f64>() / count;
@@ -189,7 +191,8 @@ mod tests {
 
     #[test]
     fn a_signal_on_the_line_keeps_what_cannot_be_told_from_it() {
-        // A comb of one amplitude, one line of it at 60 Hz; a tenth of it is said to be hum.
+        // A comb of equal amplitudes with one line at 60 Hz; a tenth of that line is declared to be
+        // hum.
         let rate_hz = 1000.0;
         let mut samples: Vec<f64> = (0..2000)
             .map(|i| {

@@ -1,8 +1,8 @@
-//! Hum of the mains in the record.
+//! Mains hum in the record.
 //!
-//! A line at 50 or 60 Hz (`orders`: and its orders 2 to 5), added to the record; the phase belongs to the record,
-//! the frequency is that of the grid within ¼ %. **Valid for a steady grid.** Mistaken for an order of the shaft
-//! (`rotor-imbalance`) that falls on the same frequency.
+//! A line at 50 or 60 Hz (`orders`: and its orders 2 to 5), added to the record; its phase differs from record to
+//! record, its frequency is that of the grid within ¼ %. **Valid for a steady grid.** Mistaken for an order of
+//! the shaft (`rotor-imbalance`) at the same frequency.
 
 use super::lines::SpectralLine;
 use super::{Action, Effect, EffectParameter, Form, ParameterScale, Stage};

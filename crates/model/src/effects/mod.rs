@@ -1,19 +1,18 @@
-//! What a plain stand can lack: one file for each effect, one line for it in [`EFFECTS`].
+//! Effects that a plain stand lacks: one file for each, one line for it in [`EFFECTS`].
 //!
-//! The plain stand is `x'' + 2ζω₀ x' + ω₀² x = ω₀² G u` with the applied quantity `u` and the recorded
-//! one `x` (for a torque stand `x = T_o = K θ` and `G = 1`). An effect sits at one of four places:
+//! The plain stand is `x'' + 2ζω₀ x' + ω₀² x = ω₀² G u` with the applied quantity `u` and the recorded one `x` (for a
+//! torque stand `x = T_o = K θ` and `G = 1`). An effect acts at one of four places:
 //!
 //! | place | what it does |
 //! |---|---|
-//! | [`Stage::Stand`] | a torque `n(x, x', z)` beside `x`, in units of the record: `x'' + 2ζω₀ x' + ω₀² (x + n) = ω₀² G u` |
+//! | [`Stage::Stand`] | a torque `n(x, x', z)` added to `x`, in record units: `x'' + 2ζω₀ x' + ω₀² (x + n) = ω₀² G u` |
 //! | [`Stage::Dynamics`] | a factor or a term of the linear response |
-//! | [`Stage::Chain`] | what gage, amplifier and recorder make of `x` |
-//! | [`Stage::Disturbance`] | something added that does not come from `u` |
+//! | [`Stage::Chain`] | the effect of gage, amplifier and recorder on `x` |
+//! | [`Stage::Disturbance`] | an added signal independent of `u` |
 //!
-//! Of one effect there can be several forms, as the same name stands for different equations in
-//! different texts.
+//! An effect can have several forms, as texts use the same name for different equations.
 //!
-//! [`RIVALS`] are laws that stand beside the list, so that none of it is named in their place.
+//! [`RIVALS`] are further laws outside the list; they keep an effect from being named in their place.
 
 mod action;
 mod curve;
@@ -58,7 +57,7 @@ pub use thermal_drift::subtract_course;
 pub const EFFECTS: &[&Effect] = &[
     &second_mode::EFFECT,
     &structural_damping::EFFECT,
-    // Before the low-pass: one whose corner cannot be seen is a delay.
+    // Before the low-pass: a low-pass whose corner is out of reach is a delay.
     &time_delay::EFFECT,
     &recorder_lowpass::EFFECT,
     &capacitive_coupling::EFFECT,
@@ -80,7 +79,7 @@ pub const EFFECTS: &[&Effect] = &[
     &saturation::EFFECT,
 ];
 
-/// Where in the chain from torque to record an effect sits.
+/// Place of an effect in the chain from torque to record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Stage {
     /// A restoring or friction torque in the stand, integrated in time.
@@ -91,7 +90,7 @@ pub enum Stage {
     Gage,
     /// The recorder: lag, delay, coupling, drift.
     Chain,
-    /// The last link: what cannot be recorded any more.
+    /// The last link: the limits of the recordable range.
     Limit,
     /// Added to the record, independent of the applied quantity.
     Disturbance,
@@ -108,15 +107,15 @@ pub struct Effect {
     pub meaning: &'static str,
     /// What to do about it at the stand, in a sentence.
     pub remedy: &'static str,
-    /// Where the equation comes from.
+    /// Source of the equation.
     pub source: &'static str,
-    /// Where it holds.
+    /// Range of validity.
     pub validity: &'static str,
-    /// What else can leave the same residual.
+    /// Effects that can leave the same residual.
     pub mistaken_for: &'static [&'static str],
-    /// The record that shows it apart from those.
+    /// The experiment that distinguishes it from those.
     pub experiment: &'static str,
-    /// Its forms, the usual one first.
+    /// Its forms, the most common first.
     pub forms: &'static [Form],
 }
 
@@ -127,30 +126,30 @@ pub struct Form {
     pub name: &'static str,
     /// Its equation.
     pub law: &'static str,
-    /// Where it sits in the chain.
+    /// Its place in the chain.
     pub stage: Stage,
     /// Its parameters.
     pub parameters: &'static [EffectParameter],
-    /// Values, in scales, from which a fit starts; several where the error has several minima.
+    /// Start values of a fit, in scales; several where the error has several minima.
     pub starts: &'static [&'static [f64]],
-    /// The effect with these values, in units of the record, s and Hz.
+    /// Builds the effect from parameters in units of the record, s and Hz.
     pub build: fn(&[f64]) -> Action,
 }
 
 impl Effect {
-    /// Whether it and another one can leave the same residual.
+    /// Whether both can leave the same residual.
     #[must_use]
     pub fn resembles(&self, other: &Self) -> bool {
         self.mistaken_for.contains(&other.name) || other.mistaken_for.contains(&self.name)
     }
 
-    /// The effect of a name.
+    /// The effect with the given name.
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {
         EFFECTS.iter().copied().find(|effect| effect.name == name)
     }
 
-    /// The form of a name; the first one for none.
+    /// The form with the given name; the first form for `None`.
     #[must_use]
     pub fn form(&self, name: Option<&str>) -> Option<&'static Form> {
         match name {

@@ -1,4 +1,4 @@
-//! Parameters of effects: units, physical bounds, and the scales that make them pure numbers.
+//! Parameters of effects: units, physical bounds, and the scales that make them dimensionless.
 
 /// A parameter of an effect.
 #[derive(Debug)]
@@ -7,25 +7,25 @@ pub struct EffectParameter {
     pub name: &'static str,
     /// Its unit.
     pub unit: Unit,
-    /// What it is measured with in a fit.
+    /// Its scale in a fit.
     pub scale: ParameterScale,
-    /// Least physical value, in scales.
+    /// Physical lower bound, in scales.
     pub lower: f64,
-    /// Greatest physical value, in scales.
+    /// Physical upper bound, in scales.
     pub upper: f64,
-    /// Whether a fit moves the reciprocal: zero is then an effect that is not there.
+    /// Whether a fit uses the reciprocal, so that zero means no effect.
     pub reciprocal: bool,
-    /// Whether it is a corner in Hz with which what was before a record fades: an unknown share of that belongs to the
-    /// record.
+    /// Whether it is a corner in Hz at which the history before a record decays: an unknown part of that history
+    /// belongs to the record.
     pub fades: bool,
-    /// Whether the effect is not what its name says where this is zero.
+    /// Whether the effect degenerates to another one where this is zero.
     pub essential: bool,
 }
 
 /// Unit of a parameter: recorded unit to a power, seconds to a power; or hertz.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unit {
-    /// A pure number.
+    /// Dimensionless.
     Number,
     /// Hertz.
     Hertz,
@@ -38,7 +38,7 @@ pub enum Unit {
     },
 }
 
-/// How a parameter is made a pure number near one.
+/// How a parameter is made dimensionless, with values near one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParameterScale {
     /// Recorded units by the rms of the record, times by `1/ω₀`, frequencies by `f₀`.
@@ -47,14 +47,14 @@ pub enum ParameterScale {
     Peak,
     /// Recorded units by the rms of the record, times by the length of the record.
     Record,
-    /// Not at all.
+    /// Unscaled.
     Absolute,
 }
 
 /// The scales of a set of records; fixed before any effect is fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RecordScales {
-    /// Rms of the record, about its mean.
+    /// RMS of the record about its mean.
     pub rms: f64,
     /// Largest distance of the record from its mean.
     pub peak: f64,
@@ -65,7 +65,7 @@ pub struct RecordScales {
 }
 
 impl EffectParameter {
-    /// A pure number.
+    /// A dimensionless parameter.
     #[must_use]
     pub const fn number(name: &'static str, lower: f64, upper: f64) -> Self {
         Self {
@@ -80,7 +80,7 @@ impl EffectParameter {
         }
     }
 
-    /// A frequency, in natural frequencies.
+    /// A frequency, in units of the natural frequency.
     #[must_use]
     pub const fn frequency(name: &'static str, lower: f64, upper: f64) -> Self {
         Self {
@@ -90,7 +90,7 @@ impl EffectParameter {
         }
     }
 
-    /// Recorded unit to a power times second to a power, measured by the motion.
+    /// Recorded unit to a power times second to a power, scaled with the motion.
     #[must_use]
     pub const fn motion(
         name: &'static str,
@@ -106,8 +106,8 @@ impl EffectParameter {
         }
     }
 
-    /// A frequency that a fit moves as its reciprocal, in periods of the natural frequency: infinite frequencies
-    /// are in reach then.
+    /// A frequency that a fit varies as its reciprocal, in periods of the natural frequency, so that infinite
+    /// frequencies are within reach.
     #[must_use]
     pub const fn corner(name: &'static str, lower: f64, upper: f64) -> Self {
         Self {
@@ -116,7 +116,7 @@ impl EffectParameter {
         }
     }
 
-    /// The same, as a corner below the band with which what was before a record fades.
+    /// Marks it as a corner below the band at which the history before a record decays.
     #[must_use]
     pub const fn fading(self) -> Self {
         Self {
@@ -125,7 +125,7 @@ impl EffectParameter {
         }
     }
 
-    /// The same, as what makes the effect what it is called.
+    /// Marks it as essential to the effect.
     #[must_use]
     pub const fn essential(self) -> Self {
         Self {
@@ -134,13 +134,13 @@ impl EffectParameter {
         }
     }
 
-    /// The same with another scale.
+    /// Replaces the scale.
     #[must_use]
     pub const fn by(self, scale: ParameterScale) -> Self {
         Self { scale, ..self }
     }
 
-    /// The value, in its unit, of what a fit moves.
+    /// The value in its unit, from the scaled fit variable.
     #[must_use]
     pub fn value(&self, moved: f64, scales: &RecordScales) -> f64 {
         let size = self.size(scales);
@@ -151,7 +151,7 @@ impl EffectParameter {
         }
     }
 
-    /// What a fit moves, from the value in its unit.
+    /// The scaled fit variable, from the value in its unit.
     ///
     /// ```
     /// use torqcomp_model::effects::{EffectParameter, RecordScales};
@@ -170,7 +170,7 @@ impl EffectParameter {
         }
     }
 
-    /// The standard uncertainty, in its unit, of what a fit moves.
+    /// The standard uncertainty in its unit, from that of the fit variable.
     #[must_use]
     pub fn std(&self, moved: f64, std: f64, scales: &RecordScales) -> f64 {
         let size = self.size(scales);
@@ -181,7 +181,7 @@ impl EffectParameter {
         }
     }
 
-    /// The size of the parameter's scale, in the parameter's unit.
+    /// The parameter's scale in the parameter's unit.
     ///
     /// ```
     /// use torqcomp_model::effects::{EffectParameter, RecordScales};
@@ -209,7 +209,7 @@ impl EffectParameter {
 }
 
 impl Unit {
-    /// The unit in text, for a record in a given unit (empty for a pure number).
+    /// The unit as text, for a record in a given unit (empty if dimensionless).
     ///
     /// ```
     /// use torqcomp_model::effects::Unit;

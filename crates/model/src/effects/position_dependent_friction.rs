@@ -1,11 +1,12 @@
-//! Friction that depends on where the stand is: a spot that rubs, or a wedge that presses harder the farther it goes.
+//! Position-dependent friction: a spot that rubs, or a wedge that presses harder the farther it goes.
 //!
-//! `n = F e^{−((x−c)/w)²} tanh(x'/v)` (`spot`), or `n = μ |x − c| tanh(x'/v)` (`wedge`). B. Armstrong-Hélouvry, P. Dupont,
-//! C. Canudas de Wit, *A survey of models, analysis tools and compensation methods for the control of machines with
-//! friction*, Automatica 30 (1994), 1083. **Valid where sliding is full.** Mistaken for `coulomb-friction` if the motion
-//! has one amplitude, and the wedge for `structural-damping`.
+//! `n = F e^{−((x−c)/w)²} tanh(x'/v)` (`spot`), or `n = μ |x − c| tanh(x'/v)` (`wedge`). B. Armstrong-Hélouvry, P.
+//! Dupont, C. Canudas de Wit, *A survey of models, analysis tools and compensation methods for the control of machines
+//! with friction*, Automatica 30 (1994), 1083. **Valid for gross sliding.** Mistaken for `coulomb-friction` if the
+//! motion has one amplitude, and the wedge for `structural-damping`.
 //!
-//! Integration: `x` is fixed while a torque acts, so the flow is that of [`coulomb_friction`](super::coulomb_friction).
+//! Integration: `x` is constant while a torque acts, so the flow is that of
+//! [`coulomb_friction`](super::coulomb_friction).
 
 use super::coulomb_friction::Friction;
 use super::{Action, Effect, EffectParameter, Form, Memory, ParameterScale, Stage, Torque};

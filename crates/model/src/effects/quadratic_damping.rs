@@ -1,10 +1,10 @@
-//! Damping that grows with the square of the speed, as of air.
+//! Damping proportional to the square of the speed, as of air drag.
 //!
-//! `n = d x' |x'|`. J. W. Strutt (Rayleigh), *The Theory of Sound* I (1894), 39. **Valid for turbulent
-//! flow**; at low speed drag is viscous. Mistaken for `coulomb-friction` with the other sign of its dependence
-//! on level, `bouc-wen-hysteresis`.
+//! `n = d x' |x'|`. J. W. Strutt (Rayleigh), *The Theory of Sound* I (1894), 39. **Valid for turbulent flow**;
+//! at low speed drag is viscous. Mistaken for `coulomb-friction` with the opposite dependence on level,
+//! `bouc-wen-hysteresis`.
 //!
-//! Integration: for a fixed `x`, `x' = v/(1 + ω₀² d |v| t)` exactly.
+//! Integration: for constant `x`, `x' = v/(1 + ω₀² d |v| t)` exactly.
 
 use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 

@@ -1,8 +1,8 @@
-//! Stiffness that changes in proportion to the displacement.
+//! Stiffness that changes linearly with displacement.
 //!
-//! `n = c x²` (even: stiffer to one side, as of a beam with preload or a bent one) or `n = c x |x|` (odd:
-//! stiffer to both sides). A. H. Nayfeh, D. T. Mook, *Nonlinear Oscillations* (1979), 2.3. **Valid for small
-//! changes**: at `2 c x = −1` the even form has no stiffness left. Mistaken for `gage-nonlinearity` (even) and
+//! `n = c x²` (even: stiffer on one side, as a preloaded or bent beam) or `n = c x |x|` (odd: stiffer on both
+//! sides). A. H. Nayfeh, D. T. Mook, *Nonlinear Oscillations* (1979), 2.3. **Valid for small changes**: at
+//! `2 c x = −1` the even form loses all stiffness. Mistaken for `gage-nonlinearity` (even) and
 //! `cubic-stiffness` (odd).
 
 use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};

@@ -1,8 +1,9 @@
-//! A line at the rate of the shaft.
+//! A line at the shaft speed.
 //!
-//! `y = x + a sin(2π f t + phase)` (`twice`: and twice the rate, as of misalignment): an unbalanced or misaligned rotor turns a torque or a force once a turn (the
-//! thesis, section III). The rate is found in the data; the phase belongs to the record. **Valid for a
-//! constant speed.** Mistaken for `mains-pickup` where the rate or an order of it falls on the mains.
+//! `y = x + a sin(2π f t + phase)` (`twice`: and at twice the speed, as of misalignment): an unbalanced or misaligned
+//! rotor produces a torque or force that rotates with the shaft (the thesis, section III). The speed is found in the
+//! data; the phase differs from record to record. **Valid for a constant speed.** Mistaken for `mains-pickup` where the
+//! speed or an order of it coincides with the mains.
 
 use super::lines::SpectralLine;
 use super::{Action, Effect, EffectParameter, Form, ParameterScale, Stage};
@@ -23,7 +24,7 @@ pub(super) static EFFECT: Effect = Effect {
             law: "y = x + a sin(2 pi f t + phase)",
             stage: Stage::Disturbance,
             parameters: &[RATE, EffectParameter::motion("amplitude", 1, 0, 0.0, 10.0)],
-            // The rate is looked for in the spectrum of the residual.
+            // The speed is searched for in the spectrum of the residual.
             starts: &[],
             build: |p| Action::Lines(SpectralLine::orders(p)),
         },
@@ -42,6 +43,6 @@ pub(super) static EFFECT: Effect = Effect {
     ],
 };
 
-/// From three turns in a record on, up to any number.
+/// At least three turns per record, without an upper bound.
 const RATE: EffectParameter =
     EffectParameter::frequency("frequency", 3.0, 1e9).by(ParameterScale::Record);

@@ -1,8 +1,8 @@
 //! A recorder or amplifier that reaches the end of its range.
 //!
 //! `y = clamp(x, −L, L)` (`hard`; `uneven` with two limits), `y = L tanh(x/L)` (`soft`) or `y = x/(1 + |x/L|^p)^{1/p}`
-//! (`knee`). **What was cut off cannot be recovered**; the soft
-//! form can, up to just below `L`. Mistaken for `gage-nonlinearity` (cube) if soft.
+//! (`knee`). **Clipped values cannot be recovered**; those of a soft form can, up to just below `L`. Mistaken for
+//! `gage-nonlinearity` (cube) if soft.
 
 use super::curve::curve;
 use super::{
@@ -13,7 +13,7 @@ use super::{
 const LIMIT: EffectParameter =
     EffectParameter::motion("limit", 1, 0, 0.05, 4.0).by(ParameterScale::Peak);
 
-/// A record far below the limit of a soft form bends all the same.
+/// A soft form curves noticeably even far below its limit.
 const FAR_LIMIT: EffectParameter =
     EffectParameter::motion("limit", 1, 0, 0.05, 15.0).by(ParameterScale::Peak);
 
@@ -32,8 +32,8 @@ pub(super) static EFFECT: Effect = Effect {
             law: "y = clamp(x, -L, L)",
             stage: Stage::Limit,
             parameters: &[LIMIT],
-            // The limit is below the peak of the record by what noise adds to it; from farther below, a step past the peak
-            // sees no slope.
+            // Noise raises the peak of the record above the limit; from a start farther below, a step past the peak
+            // finds zero slope.
             starts: &[
                 &[0.9998],
                 &[0.9995],
@@ -86,7 +86,7 @@ pub(super) static EFFECT: Effect = Effect {
             starts: &[&[1.1], &[2.5], &[6.0]],
             build: |p| {
                 let limit = p[0];
-                // Just below the limit noise would be blown up without bound.
+                // Just below the limit the inverse would amplify noise without bound.
                 curve(
                     move |x| limit * (x / limit).tanh(),
                     move |y| limit * (y / limit).clamp(-0.999, 0.999).atanh(),
@@ -106,11 +106,12 @@ struct Clipping {
     upper: f64,
 }
 
-/// Standard deviations of the noise within which a sample counts as at the limit.
+/// Distance from the limit, in standard deviations of the noise, within which a sample counts as
+/// clipped.
 const AT_LIMIT: f64 = 3.0;
-/// Part of the limit within which a sample counts as at it.
+/// Distance from the limit, relative to it, within which a sample counts as clipped.
 const RELATIVE: f64 = 1e-9;
-/// A limit that many times the largest sample away is not a limit of this record.
+/// Ratio of limit to largest sample beyond which the limit does not apply to the record.
 const OUT_OF_REACH: f64 = 1e3;
 
 impl Distortion for Clipping {
@@ -120,7 +121,7 @@ impl Distortion for Clipping {
         }
     }
 
-    /// What was cut off is lost: the samples at the limits are marked.
+    /// Clipped values are lost: the samples at the limits are marked.
     fn inverse(&self, _: SampleClock, noise_std: f64, samples: &mut [f64]) -> Unrecovered {
         let largest = samples
             .iter()

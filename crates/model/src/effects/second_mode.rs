@@ -10,7 +10,7 @@ use crate::modal::ModalResponse;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-/// Far above the band nothing shows of a mode but a slope, which has other causes.
+/// A mode far above the band shows only as a slope, which has other causes.
 const FREQUENCY: EffectParameter = EffectParameter::frequency("frequency", 0.05, 20.0);
 const DAMPING: EffectParameter = EffectParameter::number("damping_ratio", 1e-4, 1.0);
 const SHARE: EffectParameter = EffectParameter::number("share", -3.0, 3.0);
@@ -79,7 +79,7 @@ pub(super) static EFFECT: Effect = Effect {
             name: "series",
             law: "H = H1 H2",
             stage: Stage::Dynamics,
-            // With more damping it is a low-pass of second order.
+            // With more damping it is a second-order low-pass.
             parameters: &[
                 FREQUENCY,
                 EffectParameter::number("damping_ratio", 1e-4, 0.3),
@@ -103,7 +103,7 @@ pub(super) static EFFECT: Effect = Effect {
             build: |p| {
                 let (second, ratio) = (mode(p[0], p[1]), p[2]);
                 factor(move |first, omega| {
-                    // J₂ hangs on J₁: (s² + …)₁ x + μ s² (2ζ₂ω₂ s + ω₂²)/(s² + …)₂ x = ω₁² u.
+                    // J₂ is attached to J₁: (s² + …)₁ x + μ s² (2ζ₂ω₂ s + ω₂²)/(s² + …)₂ x = ω₁² u.
                     let w1 = omega / first.first().omega_rad_s;
                     let hung = second.inverse(omega) + (omega / second.omega_rad_s).powi(2);
                     let load = -ratio * w1 * w1 * hung * second.response(omega);

@@ -1,4 +1,4 @@
-//! Friction that falls once the stand slides, and the elastic sticking before.
+//! Friction that falls with sliding speed, and the elastic sticking before.
 //!
 //! `F(x') = F (1 − d (1 − e^{−(x'/v_s)²}))`, from `F` at rest to `(1 − d) F` at speed, as
 //! `n = F(x') sgn x'` with sticking (`sharp`), as `n = F(x') tanh(x'/v)` (`tanh`), or as bristles that bend by `z` before they
@@ -7,15 +7,15 @@
 //! P. Lischinsky, *A new model for control of systems with friction*, IEEE Trans. Autom. Control 40 (1995), 419.
 //! **Valid for steady lubrication.** Mistaken for `coulomb-friction` where few speeds occur.
 //!
-//! Integration: sharp friction is the dry friction `F`, whose switching is looked for, less what it falls by, which is
-//! smooth and zero at rest. For `tanh`, the flow is that of [`coulomb_friction`](super::coulomb_friction) with the torque
-//! that holds halfway. The bristles follow the steps of `x` exactly for the `F(x')` of each step.
+//! Integration: sharp friction is the dry friction `F`, whose switching is located, minus its drop, which is smooth and
+//! zero at rest. For `tanh`, the flow is that of [`coulomb_friction`](super::coulomb_friction) with the midpoint value
+//! of the torque. The bristles follow the steps of `x` exactly for the `F(x')` of each step.
 
 use super::coulomb_friction::Friction;
 use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 
 const TORQUE: EffectParameter = EffectParameter::motion("torque", 1, 0, 0.0, 5.0);
-/// Without a drop it is friction of constant size.
+/// Without a drop it is friction of constant magnitude.
 const DROP: EffectParameter = EffectParameter::number("drop", 0.0, 1.0).essential();
 const STRIBECK_SPEED: EffectParameter = EffectParameter::motion("stribeck_speed", 1, -1, 0.01, 3.0);
 
@@ -93,13 +93,13 @@ impl Falling {
         }
     }
 
-    /// What friction has fallen by at a speed.
+    /// Drop of the friction at a speed.
     fn fallen(&self, speed: f64) -> f64 {
         let part = speed / self.stribeck_speed;
         -self.torque * self.drop * (-part * part).exp_m1()
     }
 
-    /// Friction that does not fall any further, as at that speed.
+    /// Friction of constant magnitude, as at that speed.
     fn at(&self, speed: f64) -> Friction {
         Friction {
             torque: self.torque - self.fallen(speed),
@@ -135,7 +135,7 @@ impl Torque for Falling {
     }
 }
 
-/// Elastic contacts that slide: what is remembered is their bending and the last displacement.
+/// Elastic contacts that slide; the memory holds their deflection and the last displacement.
 struct Bristles {
     friction: Falling,
     stiffness: f64,

@@ -1,9 +1,9 @@
-//! Loss in the material: out of phase with the displacement, not with the speed.
+//! Material damping: in quadrature with the displacement, independent of the speed.
 //!
-//! `K (1 + jη)` for positive frequencies: the response becomes `1/(1 − (ω/ω₀)² + 2jζω/ω₀ + jη sgn ω)`.
-//! T. Theodorsen, I. E. Garrick, NACA Report 685 (1940). **Valid for steady vibration**; taken literally it acts
-//! before its cause (`springpot`, `K (jω/ω₀)^α`, does not; A. Gemant, Physics 7 (1936), 311), which shows in the first moments of a transient only. Mistaken for viscous damping where
-//! only the resonance is excited, `coulomb-friction` at one level.
+//! `K (1 + jη)` for positive frequencies: the response becomes `1/(1 − (ω/ω₀)² + 2jζω/ω₀ + jη sgn ω)`. T. Theodorsen,
+//! I. E. Garrick, NACA Report 685 (1940). **Valid for steady vibration**; strictly it is non-causal (`springpot`,
+//! `K (jω/ω₀)^α`, is causal; A. Gemant, Physics 7 (1936), 311), which shows only at the very start of a transient.
+//! Mistaken for viscous damping where only the resonance is excited, `coulomb-friction` at one level.
 
 use super::{Action, Effect, EffectParameter, Form, Mode, Stage};
 use num_complex::Complex64;
@@ -42,7 +42,8 @@ pub(super) static EFFECT: Effect = Effect {
             build: |p| {
                 let order = p[0];
                 factor(move |mode, omega, plain| {
-                    // At rest the stiffness of a springpot is zero: far below the band it is held.
+                    // The static stiffness of a springpot is zero: far below the band it is
+                    // clamped.
                     let w = (omega / mode.omega_rad_s).abs().max(1e-4);
                     let turn = (0.5 * std::f64::consts::PI * order).copysign(omega);
                     plain - 1.0 + Complex64::from_polar(w.powf(order), turn)
@@ -70,7 +71,7 @@ pub(super) static EFFECT: Effect = Effect {
     ],
 };
 
-/// The factor that changes the `1 − (ω/ω₀)² + 2jζ ω/ω₀` of every mode of the stand.
+/// A factor that modifies the `1 − (ω/ω₀)² + 2jζ ω/ω₀` of every mode of the stand.
 fn factor(change: impl Fn(&Mode, f64, Complex64) -> Complex64 + Send + Sync + 'static) -> Action {
     Action::Factor(Box::new(move |stand, omega| {
         stand.inverse(omega) / stand.inverse_with(omega, |mode, plain| change(mode, omega, plain))

@@ -1,11 +1,10 @@
-//! A zero or a sensitivity that moves with temperature.
+//! Temperature drift of zero or sensitivity.
 //!
 //! `linear`: `y = x + d t`; `exponential`: `y = x + D (1 − e^{−t/τ})`, a body that warms up; `sensitivity`:
-//! `y = (1 + g t) x`. `t` is the time since the record began.
-//! `course`: any slow course, of up to eight half waves over the record; like the phase of a line it belongs to the
-//! record and is found anew in each. Thesis, Appendix B: "temperatures … not large enough" for the
-//! gage factor; as a zero shift 2 % of resistance at 85 °F is. **Valid over one warm-up.** Mistaken for `ac-coupled` of
-//! `capacitive-coupling`, a slow disturbance.
+//! `y = (1 + g t) x`. `t` is the time since the record began. `course`: any slow trend of up to eight half waves over
+//! the record; like the phase of a line it belongs to the record and is estimated anew in each. Thesis, Appendix B:
+//! "temperatures … not large enough" for the gage factor; as a zero shift 2 % of resistance at 85 °F is. **Valid over
+//! one warm-up.** Mistaken for `ac-coupled` of `capacitive-coupling`, a slow disturbance.
 
 use std::f64::consts::PI;
 
@@ -14,7 +13,7 @@ use super::{
     Treatment, Unrecovered,
 };
 
-/// Most half waves of a course over a record.
+/// Maximum number of half waves of a trend over a record.
 const HALF_WAVES: usize = 8;
 
 pub(super) static EFFECT: Effect = Effect {
@@ -122,12 +121,14 @@ impl Distortion for Sensitivity {
     }
 }
 
-/// Half waves above those of a course, over as many as it has, that tell how much of them is signal.
+/// Number of higher half waves, in multiples of those of a trend, from which its signal content is
+/// estimated.
 const COURSE_BESIDE: usize = 2;
 
-/// Takes a slow course of as many half waves off a record, its mean left.
+/// Subtracts a slow trend of this many half waves from a record, keeping its mean.
 ///
-/// Each half wave is shrunk by `1 − S/c²`, `S` being what the half waves just above have, which are signal.
+/// Each half wave is shrunk by `1 − S/c²`, `S` being the power of the half waves just above, which are
+/// signal.
 pub fn subtract_course(samples: &mut [f64], half_waves: usize) {
     let count = samples.len() as f64;
     let wave = |k: usize, i: usize| (PI * k as f64 * (i as f64 + 0.5) / count).cos();
@@ -143,7 +144,7 @@ pub fn subtract_course(samples: &mut [f64], half_waves: usize) {
         .map(|k| part(samples, k).powi(2))
         .collect();
     beside.sort_by(f64::total_cmp);
-    // Lines of a comb are few: the middle one is beside them. The square of a normal number has a median of 0.455.
+    // A comb has few lines, so the median is unaffected. The square of a normal variable has a median of 0.455.
     let beside = beside.get(beside.len() / 2).map_or(0.0, |b| b / 0.455);
     for k in 1..=half_waves {
         let own = part(samples, k);

@@ -1,4 +1,4 @@
-//! A record that lags behind by a constant time.
+//! A constant time delay of the record.
 //!
 //! `y(t) = x(t − τ)`, response `e^{−jωτ}`. **Valid if both channels share one clock**; where two recorders run,
 //! their clocks drift apart. Mistaken for `recorder-lowpass` with a corner far above the excitation.

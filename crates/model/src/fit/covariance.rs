@@ -1,26 +1,27 @@
-//! Covariance of the parameters, and the directions that the data do not determine.
+//! Covariance of the parameters, and the directions not identifiable from the data.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::quantity::Covariance;
 
-/// Singular values below this part of the largest, after scaling of the columns, count as zero: derivatives by differences
-/// have about ten digits.
+/// Singular values below this fraction of the largest, after scaling of the columns, count as zero: finite-difference
+/// derivatives have about ten digits.
 const RANK_TOLERANCE: f64 = 1e-9;
-/// Share of a parameter in an undetermined direction from which it is undetermined itself.
+/// Share of a parameter in an undetermined direction above which the parameter itself is
+/// undetermined.
 const SHARE: f64 = 1e-3;
 
 /// A combination of parameters along which the fit does not change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Undetermined {
-    /// Index of each parameter that takes part and its relative change along the direction.
+    /// Index of each parameter involved and its relative change along the direction.
     pub shares: Vec<(usize, f64)>,
 }
 
 /// Covariance and undetermined directions from the triangular factor of the Jacobian.
 ///
-/// `indices` are the parameters the columns belong to, out of `count`; `variance` gives
-/// that of a residual of weight 1 from the rank, `None` if unknown.
+/// `indices` are the parameters of the columns, out of `count`; `variance` returns the variance of
+/// a residual of weight 1 from the rank, `None` if unknown.
 pub(super) fn covariance(
     r: &DMatrix<f64>,
     indices: &[usize],
@@ -30,7 +31,7 @@ pub(super) fn covariance(
 ) -> (Covariance, Vec<Undetermined>) {
     let n = indices.len();
     if n == 0 {
-        // Every parameter is held at a bound: nothing was fitted, and there is nothing to be uncertain about.
+        // Every parameter is fixed at a bound, so nothing was fitted and there is no covariance.
         let places = vec![None; count];
         let matrix = DMatrix::zeros(0, 0);
         return (Covariance { places, matrix }, Vec::new());
@@ -71,12 +72,12 @@ pub(super) fn covariance(
     (Covariance::of_some(&known, count, matrix), undetermined)
 }
 
-/// A null direction in relative changes of the parameters, its largest being 1.
+/// A null direction in relative changes of the parameters, normalised to a maximum of 1.
 fn direction(row: &DVector<f64>, norms: &[f64], indices: &[usize], sizes: &[f64]) -> Undetermined {
     let dead = norms.contains(&0.0);
     let change: Vec<f64> = (0..indices.len())
         .map(|j| match (dead, norms[j] > 0.0) {
-            // A column without effect is a direction of its own.
+            // A column without effect is a null direction by itself.
             (true, false) => row[j],
             (true, true) if row[j].abs() <= SHARE => 0.0,
             _ => row[j] / (norms[j] * sizes[j]),
@@ -98,7 +99,7 @@ fn direction(row: &DVector<f64>, norms: &[f64], indices: &[usize], sizes: &[f64]
 mod tests {
     use super::*;
 
-    /// As where every parameter ends at a bound.
+    /// As when every parameter ends at a bound.
     #[test]
     fn no_column_has_no_covariance() {
         let (found, undetermined) = covariance(&DMatrix::zeros(0, 0), &[], &[], 2, |_| Some(1.0));

@@ -6,10 +6,10 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FitError {
-    /// A parameter's start, bounds or scale are invalid.
+    /// Invalid start, bounds or scale of a parameter.
     #[error("parameter {name}: {problem}")]
     Parameter {
-        /// Its name.
+        /// Name of the parameter.
         name: String,
         /// The problem, and what was expected.
         problem: String,
@@ -17,7 +17,7 @@ pub enum FitError {
     /// No parameter is free.
     #[error("every parameter is fixed; free at least one")]
     NothingFree,
-    /// There are fewer residuals than free parameters.
+    /// Fewer residuals than free parameters.
     #[error(
         "{residuals} residuals cannot determine {free} parameters; record more, or fix some of them"
     )]

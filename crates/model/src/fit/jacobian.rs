@@ -1,4 +1,4 @@
-//! Derivatives of the residuals, from the problem or by differences.
+//! Derivatives of the residuals, from the problem or by finite differences.
 
 use nalgebra::DMatrix;
 
@@ -13,10 +13,10 @@ pub(super) struct Derivatives<'a> {
     pub differences: Differences,
 }
 
-/// Points at which the residuals are evaluated together.
+/// Number of points at which the residuals are evaluated at once.
 const AT_ONCE: usize = 4;
 
-/// A column, and the evaluations that it took.
+/// A column of the Jacobian, and the evaluations that it took.
 type Column = (Vec<f64>, usize);
 
 /// Columns of the free parameters, and the number of evaluations.
@@ -56,13 +56,13 @@ fn finite(matrix: DMatrix<f64>) -> Result<DMatrix<f64>, FitError> {
     }
 }
 
-/// Where the residuals are evaluated for one column, and what it is divided by.
+/// Evaluation points of one column, and its divisor.
 struct Ends {
     points: Vec<Vec<f64>>,
     width: f64,
 }
 
-/// All columns; points are evaluated some at a time, for all of them together may take much memory.
+/// All columns; points are evaluated in batches, to limit memory.
 fn columns(
     evaluated: &Evaluated,
     how: &Derivatives,
@@ -92,7 +92,7 @@ fn columns(
 }
 
 impl Derivatives<'_> {
-    /// For ∂r/∂p of one parameter: a step that stays within its bounds, to both sides or to one.
+    /// Evaluation points of ∂r/∂p for one parameter, central or one-sided, within its bounds.
     fn ends(&self, values: &[f64], index: usize) -> Ends {
         let parameter = &self.parameters[index];
         let value = values[index];

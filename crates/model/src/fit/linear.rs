@@ -1,4 +1,4 @@
-//! Linear least squares, with the combinations of parameters that the data do not determine.
+//! Linear least squares, with the combinations of parameters not identifiable from the data.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,11 +10,11 @@ use crate::quantity::Covariance;
 /// A linear fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearFit {
-    /// Parameters; along undetermined directions, the smallest that fit.
+    /// Parameters; the minimum-norm solution along undetermined directions.
     pub values: Vec<f64>,
     /// Standard uncertainties; `None` where undetermined.
     pub std: Vec<Option<f64>>,
-    /// Covariance of those that have one.
+    /// Covariance of the determined parameters.
     pub covariance: Covariance,
     /// Combinations of parameters that the data do not determine.
     pub undetermined: Vec<Undetermined>,
@@ -22,19 +22,21 @@ pub struct LinearFit {
     pub residuals: Vec<f64>,
     /// Sum of their squares.
     pub sum_of_squares: f64,
-    /// Rows less parameters determined.
+    /// Rows minus the number of determined parameters.
     pub degrees_of_freedom: usize,
-    /// Largest over smallest singular value, after scaling of the columns to one length.
+    /// Condition number: largest over smallest singular value, after scaling of the columns to unit
+    /// length.
     pub condition: f64,
 }
 
-/// Singular values below this part of the largest count as zero.
+/// Singular values below this fraction of the largest count as zero.
 const RANK_TOLERANCE: f64 = 1e-11;
 
-/// Finds x that makes |W (A x − b)|² least, W being `weights` on the diagonal (1/σ each row), by
-/// singular values of the columns scaled to one length.
+/// Minimises |W (A x − b)|², with `weights` on the diagonal of W (1/σ per row), by singular value
+/// decomposition of the columns scaled to unit length.
 ///
-/// The variance of a weighted residual is taken from the residuals, or is 1 if `variance_known`.
+/// The variance of a weighted residual is estimated from the residuals, or is 1 if
+/// `variance_known`.
 ///
 /// # Errors
 /// [`FitError`] if the sizes do not match, there are fewer rows than columns, or a number is not

@@ -12,13 +12,13 @@ use super::{Differences, Fit, FitError, Parameter, Residuals, StopReason};
 /// Options of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
-    /// Differences for problems without derivatives.
+    /// Finite-difference scheme for problems without derivatives.
     pub differences: Differences,
-    /// Most evaluations of the residuals.
+    /// Maximum number of evaluations of the residuals.
     pub most_evaluations: usize,
     /// Relative reduction of the sum of squares, and relative step, below which the fit has converged.
     pub tolerance: f64,
-    /// Factors of the residuals: 1/σ makes them comparable.
+    /// Weights of the residuals; 1/σ makes them comparable.
     pub weights: Option<Vec<f64>>,
     /// Whether the weighted residuals are known to have variance 1. If not, the variance is estimated from the residuals.
     pub variance_known: bool,
@@ -36,7 +36,7 @@ impl Default for Options {
     }
 }
 
-/// First damping, relative to the scaling.
+/// Initial damping, relative to the scaling.
 const FIRST_DAMPING: f64 = 1e-3;
 /// Damping at which steps become zero.
 const MOST_DAMPING: f64 = 1e24;
@@ -79,7 +79,7 @@ struct State<'a> {
     reduced: Reduced,
     scaling: Vec<f64>,
     lambda: f64,
-    /// Factor of the next rise of the damping.
+    /// Factor of the next increase of the damping.
     rise: f64,
     evaluations: usize,
 }
@@ -135,7 +135,7 @@ impl<'a> State<'a> {
         Ok(state)
     }
 
-    /// Moré's scaling: the largest norm each column has had.
+    /// Moré's scaling: the largest norm of each column so far.
     fn rescale(&mut self) {
         for (j, scale) in self.scaling.iter_mut().enumerate() {
             let norm = self.reduced.r.column(j).norm();
@@ -236,7 +236,7 @@ impl<'a> State<'a> {
         })
     }
 
-    /// More damping, after a step that did not lower the sum of squares.
+    /// Increases the damping after a step that did not reduce the sum of squares.
     fn refuse(&mut self) -> Progress {
         self.lambda = self.lambda.max(1e-15) * self.rise;
         self.rise *= 2.0;
@@ -247,7 +247,7 @@ impl<'a> State<'a> {
         }
     }
 
-    /// Takes a step; the better the model predicted its gain, the lower the damping becomes.
+    /// Accepts a step; the better the predicted gain, the lower the damping becomes.
     fn accept(
         &mut self,
         values: Vec<f64>,

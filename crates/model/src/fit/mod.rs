@@ -1,4 +1,4 @@
-//! Fits of models to data: nonlinear and linear least squares, with what the data cannot tell.
+//! Fits of models to data: nonlinear and linear least squares, with undetermined directions.
 //!
 //! ```text
 //! Parameter(start, bounds) + Residuals ──► minimize ──► Fit: values, std, covariance, StopReason

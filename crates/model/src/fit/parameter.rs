@@ -7,20 +7,21 @@ use super::FitError;
 pub struct Parameter {
     /// Name in reports.
     pub name: String,
-    /// Value to start from, within the bounds.
+    /// Start value, within the bounds.
     pub start: f64,
-    /// Least value, or −∞.
+    /// Lower bound, or −∞.
     pub lower: f64,
-    /// Greatest value, or +∞.
+    /// Upper bound, or +∞.
     pub upper: f64,
-    /// Size of a relevant change, greater than 0; sets the steps of differences where the value is small.
+    /// Size of a relevant change, greater than 0; sets the finite-difference step where the value is
+    /// small.
     pub scale: f64,
-    /// Whether it keeps its start.
+    /// Whether it is fixed at its start value.
     pub fixed: bool,
 }
 
 impl Parameter {
-    /// A free parameter without bounds, with the size of its start (or 1) as scale.
+    /// A free parameter without bounds, with the magnitude of its start (or 1) as scale.
     ///
     /// ```
     /// use torqcomp_model::fit::Parameter;
@@ -40,35 +41,35 @@ impl Parameter {
         }
     }
 
-    /// The same with a least value.
+    /// Sets the lower bound.
     #[must_use]
     pub fn at_least(mut self, lower: f64) -> Self {
         self.lower = lower;
         self
     }
 
-    /// The same with a greatest value.
+    /// Sets the upper bound.
     #[must_use]
     pub fn at_most(mut self, upper: f64) -> Self {
         self.upper = upper;
         self
     }
 
-    /// The same with another scale.
+    /// Sets the scale.
     #[must_use]
     pub fn scaled(mut self, scale: f64) -> Self {
         self.scale = scale;
         self
     }
 
-    /// The same, kept at its start.
+    /// Fixes the parameter at its start value.
     #[must_use]
     pub fn fixed(mut self) -> Self {
         self.fixed = true;
         self
     }
 
-    /// Refuses numbers that contradict each other.
+    /// Rejects inconsistent start, bounds and scale.
     pub(super) fn check(&self) -> Result<(), FitError> {
         let wrong = |problem: String| {
             Err(FitError::Parameter {

@@ -6,18 +6,20 @@ use super::FitError;
 
 /// Residuals and, optionally, their derivatives.
 ///
-/// A closure `Fn(&[f64], &mut Vec<f64>) -> Result<(), FitError>` has no derivatives; differences are used.
+/// A closure `Fn(&[f64], &mut Vec<f64>) -> Result<(), FitError>` has no derivatives; finite differences
+/// are used.
 pub trait Residuals: Sync {
     /// Writes the residuals at `values` (all parameters, fixed ones too) into `out`, which is empty.
     ///
     /// # Errors
-    /// [`FitError::Model`] where the model cannot be evaluated: the fit then takes a smaller step.
+    /// [`FitError::Model`] where the model cannot be evaluated; the fit then takes a smaller step.
     fn residuals(&self, values: &[f64], out: &mut Vec<f64>) -> Result<(), FitError>;
 
-    /// The residuals at several points, as differences need them: one after the other, unless a model has a faster way.
+    /// The residuals at several points, as finite differences need them: one after the other, unless a model has a
+    /// faster way.
     ///
     /// # Errors
-    /// At each point as [`Residuals::residuals`].
+    /// For each point as for [`Residuals::residuals`].
     fn residuals_of_each(&self, points: &[Vec<f64>]) -> Vec<Result<Vec<f64>, FitError>> {
         let one = |values: &Vec<f64>| {
             let mut out = Vec::new();
@@ -26,16 +28,16 @@ pub trait Residuals: Sync {
         points.iter().map(one).collect()
     }
 
-    /// Whether [`Residuals::jacobian`] is implemented; otherwise differences are used.
+    /// Whether [`Residuals::jacobian`] is implemented; otherwise finite differences are used.
     fn has_jacobian(&self) -> bool {
         false
     }
 
-    /// Writes ∂residual/∂parameter into the matrix, which is all zero: a row each residual and a
-    /// column each parameter, fixed ones too.
+    /// Writes ∂residual/∂parameter into the matrix, which is zero initially: one row per residual,
+    /// one column per parameter, fixed ones included.
     ///
     /// # Errors
-    /// As [`Residuals::residuals`].
+    /// As for [`Residuals::residuals`].
     fn jacobian(&self, values: &[f64], out: &mut DMatrix<f64>) -> Result<(), FitError> {
         let _ = (values, out);
         Err(FitError::Model("no derivatives are given".to_owned()))
@@ -51,7 +53,7 @@ where
     }
 }
 
-/// Residuals and derivatives, each from a closure.
+/// Residuals and derivatives from two closures.
 pub struct WithJacobian<R, J> {
     /// The residuals.
     pub residuals: R,
@@ -77,7 +79,7 @@ where
     }
 }
 
-/// Differences for problems without derivatives.
+/// Finite-difference scheme for problems without derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Differences {
     /// (r(p + h) − r(p))/h: one evaluation per parameter, seven to eight digits.
@@ -86,10 +88,10 @@ pub enum Differences {
     Central,
 }
 
-/// A problem with the weights of its residuals and their number.
+/// A problem with the weights and number of its residuals.
 pub(super) struct Evaluated<'a> {
     pub problem: &'a dyn Residuals,
-    /// Factors of the residuals, or none.
+    /// Weights of the residuals, if any.
     pub weights: Option<&'a [f64]>,
     pub expected: Option<usize>,
 }
@@ -102,7 +104,7 @@ impl Evaluated<'_> {
         self.checked(out)
     }
 
-    /// The same at several points.
+    /// Weighted residuals at several points.
     pub fn residuals_of_each(&self, points: &[Vec<f64>]) -> Vec<Result<Vec<f64>, FitError>> {
         let each = self.problem.residuals_of_each(points).into_iter();
         each.map(|residuals| residuals.and_then(|r| self.checked(r)))

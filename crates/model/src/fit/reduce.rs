@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Rows of a block: large enough for few rounds, small enough for the cache.
+/// Rows per block: large enough for few rounds, small enough for the cache.
 const BLOCK: usize = 2048;
 
 /// The problem min |A x − b| as min |R x − c|² + rest², with R square and upper triangular.
@@ -13,9 +13,9 @@ pub(super) struct Reduced {
     pub c: DVector<f64>,
 }
 
-/// Reduces [A | b] by Householder transformations, one block of rows after another (Golub & Van Loan, Matrix Computations,
-/// 4th ed., 5.2, and 6.5.3 for joining blocks). A block in which some columns are zero is first reduced without them, so that
-/// parameters that belong to a part of the rows cost nothing in the others.
+/// Reduces [A | b] by Householder transformations, one block of rows after another (Golub & Van Loan, Matrix
+/// Computations, 4th ed., 5.2, and 6.5.3 for joining blocks). A block with zero columns is first reduced without them,
+/// so that parameters that affect only some of the rows cost nothing in the others.
 pub(super) fn reduce(a: &DMatrix<f64>, b: &[f64]) -> Reduced {
     let (rows, columns) = a.shape();
     let width = columns + 1;
@@ -66,7 +66,7 @@ pub(super) fn reduce(a: &DMatrix<f64>, b: &[f64]) -> Reduced {
     }
 }
 
-/// Householder reflections in place; below the diagonal is zero afterwards.
+/// Applies Householder reflections in place; the matrix is upper triangular afterwards.
 fn triangularize(matrix: &mut DMatrix<f64>) {
     let (rows, columns) = matrix.shape();
     let data = matrix.as_mut_slice();
@@ -86,7 +86,7 @@ fn triangularize(matrix: &mut DMatrix<f64>) {
         let head = column[0];
         let alpha = if head > 0.0 { -norm } else { norm };
         let v = &mut v[..rows - k];
-        // v is scaled to v₀ = 1, which keeps it free of overflow.
+        // v is scaled to v₀ = 1, which avoids overflow.
         let pivot = head - alpha;
         v[0] = 1.0;
         v[1..]
@@ -122,7 +122,8 @@ mod tests {
     fn keeps_the_normal_equations() {
         let value = |i: usize, j: usize| ((i * (j + 2)) as f64 * 0.37).sin();
         keeps(&DMatrix::from_fn(5000, 3, value));
-        // The last three columns belong to a part of the rows each, as the amplitudes of several decays.
+        // The last three columns are each nonzero in some of the rows only, as the amplitudes of several
+        // decays.
         keeps(&DMatrix::from_fn(9000, 5, |i, j| {
             match j < 2 || i / 3000 + 2 == j {
                 true => value(i, j),

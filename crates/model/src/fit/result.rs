@@ -7,15 +7,15 @@ use crate::quantity::{Covariance, Estimates};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StopReason {
-    /// The residuals are orthogonal to every direction in which the model can move.
+    /// The residuals are orthogonal to every direction in parameter space.
     Gradient,
-    /// The sum of squares fell, and would fall, by less than the tolerance.
+    /// Actual and predicted reduction of the sum of squares are below the tolerance.
     Reduction,
-    /// The parameters moved by less than the tolerance.
+    /// The step of the parameters is below the tolerance.
     Step,
     /// The residuals are zero.
     Exact,
-    /// No step lowers the sum of squares any more: limited by rounding.
+    /// No step reduces the sum of squares further: limited by rounding.
     NoProgress,
     /// The maximum number of evaluations was reached before a minimum.
     Evaluations,
@@ -29,14 +29,14 @@ impl StopReason {
     }
 }
 
-/// A fit.
+/// Result of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
     /// Parameter values, in the order given.
     pub values: Vec<f64>,
     /// Standard uncertainties; `None` for a parameter that is fixed, at a bound, or undetermined.
     pub std: Vec<Option<f64>>,
-    /// Covariance of those that have one.
+    /// Covariance of the parameters that have an uncertainty.
     pub covariance: Covariance,
     /// Combinations of parameters that the data do not determine.
     pub undetermined: Vec<Undetermined>,
@@ -48,24 +48,24 @@ pub struct Fit {
     pub rms: f64,
     /// Sum of their squares.
     pub sum_of_squares: f64,
-    /// Residuals less parameters found.
+    /// Number of residuals minus number of parameters determined.
     pub degrees_of_freedom: usize,
-    /// Why it stopped.
+    /// Reason for stopping.
     pub stop: StopReason,
     /// Evaluations of the residuals.
     pub evaluations: usize,
 }
 
 impl Fit {
-    /// Residual standard deviation s = √(sum of squares / degrees of freedom); `None` without
-    /// freedom.
+    /// Residual standard deviation s = √(sum of squares / degrees of freedom); `None` for zero
+    /// degrees of freedom.
     #[must_use]
     pub fn residual_std(&self) -> Option<f64> {
         (self.degrees_of_freedom > 0)
             .then(|| (self.sum_of_squares / self.degrees_of_freedom as f64).sqrt())
     }
 
-    /// The parameters with their covariance, for numbers that follow from them.
+    /// The parameters with their covariance, for error propagation.
     #[must_use]
     pub fn estimates(&self) -> Estimates {
         Estimates::new(self.values.clone(), self.covariance.clone())

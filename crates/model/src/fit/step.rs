@@ -13,7 +13,7 @@ pub(super) struct Room {
 
 /// The step d that minimises |R d + c|² + λ|D d|² within the bounds.
 ///
-/// Components beyond a bound are set to it and the others solved again until all are within (an active set on the reduced
+/// Components beyond a bound are set to it and the others solved again until all are within (active set on the reduced
 /// problem). `None` if the problem is singular at this λ.
 pub(super) fn step(
     reduced: &Reduced,
@@ -52,7 +52,7 @@ pub(super) fn step(
     Some(found)
 }
 
-/// The damped step of the open components; the others have the steps in `taken`.
+/// The damped step of the free components; the others have the steps in `taken`.
 fn solve(
     reduced: &Reduced,
     scaling: &[f64],

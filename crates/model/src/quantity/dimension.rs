@@ -7,8 +7,8 @@ const BASE: [&str; 6] = ["kg", "m", "s", "A", "K", "rad"];
 
 /// Exponents of kg, m, s, A, K and rad.
 ///
-/// The radian is counted although SI calls it dimensionless, so that angles and cycles are not
-/// mixed up.
+/// The radian counts as a base unit although SI calls it dimensionless, so that angles and cycles
+/// are not confused.
 ///
 /// ```
 /// use torqcomp_model::Unit;
@@ -38,12 +38,12 @@ impl Dimension {
         self.0
     }
 
-    /// Dimension of a product: exponents add.
+    /// Dimension of a product: adds the exponents.
     pub(super) fn times(self, other: Self) -> Self {
         Self(std::array::from_fn(|i| self.0[i] + other.0[i]))
     }
 
-    /// Dimension of a power: exponents are multiplied.
+    /// Dimension of a power: multiplies the exponents.
     pub(super) fn power(self, exponent: i32) -> Self {
         Self(self.0.map(|e| e * exponent))
     }

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::dimension::Dimension;
 
-/// What can be wrong with a number, its unit or its uncertainty.
+/// An error in a number, its unit or its uncertainty.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum QuantityError {
@@ -13,7 +13,7 @@ pub enum QuantityError {
     Empty {
         /// Name of the kind expected.
         expected: &'static str,
-        /// A text that would do.
+        /// A valid text.
         example: &'static str,
     },
     /// The text does not start with a number.
@@ -22,85 +22,85 @@ pub enum QuantityError {
          without thousands marks, for example \"{example}\""
     )]
     NotANumber {
-        /// Text got.
+        /// The text.
         text: String,
-        /// A text that would do.
+        /// A valid text.
         example: &'static str,
     },
     /// The number, or the number in SI units, is not finite.
     #[error("\"{text}\" is not a finite number; check the input")]
     NotFinite {
-        /// Text got.
+        /// The text.
         text: String,
     },
-    /// A number stands without its unit.
+    /// A number without its unit.
     #[error("\"{text}\" has no unit; expected {expected} with its unit, for example \"{example}\"")]
     MissingUnit {
-        /// Text got.
+        /// The text.
         text: String,
         /// Name of the kind expected.
         expected: &'static str,
-        /// A text that would do.
+        /// A valid text.
         example: &'static str,
     },
     /// A symbol is not a known unit.
     #[error("unknown unit \"{symbol}\" in \"{unit}\"{}", hint(*.nearest))]
     UnknownUnit {
-        /// Symbol got.
+        /// The symbol.
         symbol: String,
-        /// Unit text it stands in.
+        /// Unit text that contains it.
         unit: String,
-        /// Known unit of the most similar spelling, if one is close.
+        /// Known unit with the most similar spelling, if one is close.
         nearest: Option<&'static str>,
     },
-    /// The unit text does not follow the grammar.
+    /// A syntax error in the unit text.
     #[error("the unit \"{unit}\" cannot be read: {problem}")]
     UnitSyntax {
-        /// Unit text got.
+        /// The unit text.
         unit: String,
-        /// What is wrong with it and what to write.
+        /// The error and its correction.
         problem: &'static str,
     },
-    /// `lb` or `oz` is used where it could be a mass or a force.
+    /// `lb` or `oz` that could be a mass or a force.
     #[error(
         "\"{unit}\" can be read with a force or with a mass; write \"{force}\" for the force, or \
          \"{mass}\" if the mass is meant"
     )]
     AmbiguousWeight {
-        /// Unit text got.
+        /// The unit text.
         unit: String,
-        /// The same with a force.
+        /// The unit text read as a force.
         force: String,
-        /// The same with a mass.
+        /// The unit text read as a mass.
         mass: String,
     },
-    /// The unit is the inverse of one that fits.
+    /// The reciprocal of a suitable unit.
     #[error("\"{text}\" is the inverse of a {expected}; write \"{right}\"")]
     Inverted {
-        /// Text got.
+        /// The text.
         text: String,
         /// Name of the kind expected.
         expected: &'static str,
-        /// The text that is right.
+        /// The corrected text.
         right: String,
     },
     /// A ratio of another kind.
     #[error("\"{unit}\" is not {expected}; write it as in \"{example}\"")]
     WrongRatio {
-        /// Unit text got.
+        /// The unit text.
         unit: String,
         /// Name of the kind expected.
         expected: &'static str,
-        /// A text that would do.
+        /// A valid text.
         example: &'static str,
     },
-    /// The unit does not fit the kind of quantity.
+    /// A unit of another kind of quantity.
     #[error(
         "the unit \"{unit}\" has the dimension {got}; expected {expected} ({wanted}), for example \
          \"{example}\""
     )]
     WrongDimension {
-        /// Unit text got.
+        /// The unit text.
         unit: String,
         /// Its dimension.
         got: Dimension,
@@ -108,13 +108,13 @@ pub enum QuantityError {
         expected: &'static str,
         /// Dimension of its SI unit.
         wanted: Dimension,
-        /// A text that would do.
+        /// A valid text.
         example: &'static str,
     },
     /// A temperature lies below absolute zero.
     #[error("\"{text}\" is {kelvin} K, below absolute zero; check the number and its unit")]
     BelowAbsoluteZero {
-        /// Text got.
+        /// The text.
         text: String,
         /// The temperature in kelvin.
         kelvin: f64,
@@ -122,22 +122,22 @@ pub enum QuantityError {
     /// A standard uncertainty is negative.
     #[error("a standard uncertainty must be 0 or greater, but {got} was given; drop the sign")]
     NegativeUncertainty {
-        /// What was given: a text, or a number in SI units.
+        /// The text, or the number in SI units.
         got: String,
     },
-    /// A standard uncertainty of a ratio in percent.
+    /// A standard uncertainty of a ratio in percent, which is ambiguous.
     #[error(
         "\"{text}\" can be read as percent of {of} or as the ratio itself; write \"{relative}\" for the first, or \
          \"{absolute}\" for the second"
     )]
     AmbiguousPercent {
-        /// Text got.
+        /// The text.
         text: String,
-        /// The value that it belongs to.
+        /// The value it belongs to.
         of: String,
-        /// The standard uncertainty, if percent of the value are meant.
+        /// The standard uncertainty as a percentage of the value.
         relative: f64,
-        /// The same otherwise.
+        /// The standard uncertainty as a ratio.
         absolute: f64,
     },
     /// The value or uncertainty of an estimate is not finite.
@@ -149,12 +149,12 @@ pub enum QuantityError {
         kind: String,
         /// Where the estimate comes from.
         origin: String,
-        /// Number got, in SI units.
+        /// The number in SI units.
         value: f64,
     },
 }
 
-/// Tail of the message about an unknown unit.
+/// End of the message about an unknown unit.
 fn hint(nearest: Option<&'static str>) -> String {
     match nearest {
         Some(unit) => format!("; did you mean \"{unit}\"?"),

@@ -10,7 +10,7 @@ use super::error::QuantityError;
 use super::estimates::slope;
 use super::kind::{Kind, UnitSystem};
 
-/// What a number is measured in.
+/// Unit of a number.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Measure {
     /// A kind of quantity, in its SI unit.
@@ -53,7 +53,7 @@ pub struct Estimate {
 
 impl Estimate {
     /// An estimate from its value and standard uncertainty, both in the SI unit of the kind or in the
-    /// unit given, and from its origin, such as `drawing` or `fitted: decay.csv`.
+    /// given unit, and its origin, such as `drawing` or `fitted: decay.csv`.
     ///
     /// # Errors
     /// [`QuantityError`] if a number is not finite or the uncertainty is negative.
@@ -93,8 +93,7 @@ impl Estimate {
         Ok(estimate)
     }
 
-    /// An estimate of computed numbers, without a source and unchecked: a value that is not finite is
-    /// an unknown one.
+    /// An unchecked estimate of computed numbers, without a source; a non-finite value means unknown.
     ///
     /// ```
     /// let ratio = torqcomp_model::Estimate::of("1/s^2", 25.0, Some(0.5));
@@ -110,7 +109,7 @@ impl Estimate {
         }
     }
 
-    /// The same from that origin.
+    /// Sets the source.
     #[must_use]
     pub fn with_source(self, source: impl Into<Cow<'static, str>>) -> Self {
         Self {
@@ -146,18 +145,18 @@ impl Estimate {
 
     /// An estimate of `kind` computed from others: y = f(x₁ … x_n).
     ///
-    /// The standard uncertainty follows from the law of propagation, first order and for inputs
-    /// that are not correlated (JCGM 100:2008, clause 5.1.2, equation 10):
+    /// The standard uncertainty follows from the law of propagation, first order and for
+    /// uncorrelated inputs (JCGM 100:2008, clause 5.1.2, equation 10):
     ///
     /// u²(y) = Σ (∂f/∂x_i)² u²(x_i)
     ///
     /// with central differences for ∂f/∂x_i. **An input without an uncertainty counts as exact.**
-    /// The result has an uncertainty if at least one input has one. `f` gets the values of
-    /// `inputs` in their order, in SI units, and returns y in the SI unit of `kind`. Valid while
-    /// f is nearly linear over x_i ± u(x_i).
+    /// The result has an uncertainty if at least one input has one. `f` gets the values of `inputs`
+    /// in their order, in SI units, and returns y in the SI unit of `kind`. Valid while f is nearly
+    /// linear over x_i ± u(x_i).
     ///
     /// # Errors
-    /// [`QuantityError::EstimateNotFinite`] if `f` gives no finite number at or beside the inputs.
+    /// [`QuantityError::EstimateNotFinite`] if `f` is not finite at or near the inputs.
     ///
     /// ```
     /// use torqcomp_model::{Estimate, Kind};
@@ -191,7 +190,7 @@ impl Estimate {
         Self::new(kind, value, std_uncertainty, source)
     }
 
-    /// The unit of value and uncertainty; empty for a ratio.
+    /// Unit of value and uncertainty; empty for a ratio.
     #[must_use]
     pub fn unit(&self) -> &str {
         match &self.measure {
@@ -211,7 +210,7 @@ impl Estimate {
         }
     }
 
-    /// Value in the SI unit of the kind, or in the unit given.
+    /// Value in the SI unit of the kind, or in the given unit.
     pub fn value(&self) -> f64 {
         self.value
     }
@@ -227,15 +226,15 @@ impl Estimate {
         Some(self.std_uncertainty? / self.value.abs())
     }
 
-    /// Where the estimate comes from.
+    /// Origin of the estimate.
     pub fn source(&self) -> &str {
         &self.source
     }
 
-    /// Value, uncertainty and unit for a reader, without the source.
+    /// Value, uncertainty and unit as text, without the source.
     ///
-    /// The uncertainty has two significant digits and the value ends where it does; without an
-    /// uncertainty the value has six.
+    /// The uncertainty has two significant digits and the value the same number of decimals;
+    /// without an uncertainty the value has six significant digits.
     ///
     /// ```
     /// use torqcomp_model::{Estimate, Kind, UnitSystem};
@@ -301,12 +300,12 @@ fn exponent(value: f64, digits: usize) -> i32 {
         .unwrap_or(0)
 }
 
-/// True if a number of this size reads well without a power of ten.
+/// Whether a number of this size is readable without a power of ten.
 fn is_plain(exponent: i32) -> bool {
     (-4..6).contains(&exponent)
 }
 
-/// A number with so many significant digits, without trailing zeros.
+/// A number with this many significant digits, without trailing zeros.
 fn significant(value: f64, digits: usize) -> String {
     let size = exponent(value, digits);
     let trim = |text: &str| match text.contains('.') {
@@ -320,21 +319,21 @@ fn significant(value: f64, digits: usize) -> String {
     format!("{}e{size}", trim(&scaled(value, size, digits - 1)))
 }
 
-/// value/10^size with so many decimals; in two steps, as 10^size alone may leave the range.
+/// value/10^size with this many decimals; in two steps, as 10^size alone may overflow or underflow.
 fn scaled(value: f64, size: i32, decimals: usize) -> String {
     let half = size / 2;
     let number = value / 10_f64.powi(half) / 10_f64.powi(size - half);
     format!("{number:.decimals$}")
 }
 
-/// `(value ± std)` with two digits of `std`, both at the same decimal place.
+/// `(value ± std)` with two digits of `std`, both to the same decimal place.
 fn with_uncertainty(value: f64, std: f64) -> String {
     let last = exponent(std, 2) - 1;
     let size = match value == 0.0 {
         true => last + 1,
         false => exponent(value, 6).max(last + 1),
     };
-    // Rounds at a place left of the point, where formatting alone would not.
+    // Rounds left of the decimal point, which formatting alone would not.
     let round = |number: f64| match last > 0 {
         true => (number / 10_f64.powi(last)).round() * 10_f64.powi(last),
         false => number,

@@ -1,17 +1,17 @@
-//! Several numbers with their covariance, and numbers that follow from them.
+//! Several numbers with their covariance, and its propagation.
 
 use nalgebra::DMatrix;
 
 use super::estimate::{Estimate, Measure};
 
-/// Relative step of central differences: the cube root of the spacing of floats, where the
-/// errors of truncation and rounding are about equal.
+/// Relative step of central differences: the cube root of the machine epsilon, which balances
+/// truncation and rounding errors.
 const STEP: f64 = 6.055_454_452_393_343e-6;
 
 /// Covariance of several numbers, some of which may have no uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covariance {
-    /// Place of each number in the matrix, if it has one.
+    /// Index of each number in the matrix, if it has an uncertainty.
     pub(crate) places: Vec<Option<usize>>,
     pub(crate) matrix: DMatrix<f64>,
 }
@@ -52,7 +52,7 @@ impl Covariance {
         Self { places, matrix }
     }
 
-    /// Of numbers that are not correlated; those without an uncertainty have no covariance.
+    /// Of uncorrelated numbers; those without an uncertainty have no covariance.
     #[must_use]
     pub fn independent(std: &[Option<f64>]) -> Self {
         let known: Vec<f64> = std.iter().copied().flatten().collect();
@@ -68,15 +68,15 @@ impl Covariance {
         }
     }
 
-    /// Covariance of two of them; `None` if one has no uncertainty: a parameter of a fit that is fixed, at a bound or
-    /// undetermined.
+    /// Covariance of two of them; `None` if one has no uncertainty, as a parameter of a fit that is fixed, at a bound
+    /// or undetermined.
     #[must_use]
     pub fn get(&self, i: usize, j: usize) -> Option<f64> {
         let (i, j) = (*self.places.get(i)?, *self.places.get(j)?);
         Some(self.matrix[(i?, j?)])
     }
 
-    /// The same times a factor, as where the noise is larger than the residuals show.
+    /// Scales the covariance, for example where the noise is larger than the residuals show.
     #[must_use]
     pub fn times(mut self, factor: f64) -> Self {
         self.matrix *= factor;
@@ -98,7 +98,7 @@ impl Covariance {
             .map(|c| (c / size).clamp(-1.0, 1.0))
     }
 
-    /// Of some of them, in that order.
+    /// Covariance of a selection, in the given order.
     #[must_use]
     pub fn select(&self, indices: &[usize]) -> Self {
         let mut gradients = vec![vec![0.0; self.places.len()]; indices.len()];
@@ -108,8 +108,8 @@ impl Covariance {
         self.through(&gradients)
     }
 
-    /// Of functions with these gradients, `S C Sᵀ`. A function that depends on a number without an uncertainty has
-    /// none.
+    /// Covariance of functions with these gradients, `S C Sᵀ`. A function that depends on a number without an
+    /// uncertainty has none.
     fn through<Row: AsRef<[f64]>>(&self, gradients: &[Row]) -> Self {
         let has_std = |gradient: &&Row| {
             let mut entries = gradient.as_ref().iter().zip(&self.places);
@@ -137,7 +137,8 @@ impl Covariance {
             .sum()
     }
 
-    /// Standard uncertainty of a function with that gradient (one entry for each number): √(gᵀ C g), JCGM 100:2008 (13). `None` if it depends on a number that has none.
+    /// Standard uncertainty of a function with this gradient (one entry for each number): √(gᵀ C g), JCGM 100:2008
+    /// (13). `None` if it depends on a number without an uncertainty.
     #[must_use]
     pub fn std_of(&self, gradient: &[f64]) -> Option<f64> {
         let mut sum = 0.0;
@@ -158,13 +159,13 @@ pub struct Estimates {
 }
 
 impl Estimates {
-    /// Numbers in units that the caller knows, with their covariance.
+    /// Numbers in units known to the caller, with their covariance.
     #[must_use]
     pub fn new(values: Vec<f64>, covariance: Covariance) -> Self {
         Self { values, covariance }
     }
 
-    /// Estimates that are not correlated.
+    /// Uncorrelated estimates.
     #[must_use]
     pub fn independent(estimates: &[&Estimate]) -> Self {
         let std: Vec<_> = estimates.iter().map(|e| e.std_uncertainty()).collect();
@@ -174,7 +175,7 @@ impl Estimates {
         }
     }
 
-    /// These and one more, which is not correlated with them.
+    /// Appends an uncorrelated number.
     #[must_use]
     pub fn and(mut self, value: f64, std: Option<f64>) -> Self {
         let place = self.covariance.matrix.nrows();
@@ -206,10 +207,9 @@ impl Estimates {
         Estimate::of(measure, self.values[i], self.covariance.std(i))
     }
 
-    /// Numbers y = f(x) that follow from these, with their covariance `S C Sᵀ`, `S = ∂f/∂x` by central
-    /// differences (JCGM 102:2011, 6.2.1.3); numbers without an uncertainty count as exact, and one that depends on none but these
-    /// has no uncertainty. Valid while f is nearly
-    /// linear over x ± u(x).
+    /// Functions y = f(x) of the numbers, with their covariance `S C Sᵀ`, `S = ∂f/∂x` by central differences (JCGM
+    /// 102:2011, 6.2.1.3). Numbers without an uncertainty count as exact, and a function of only such numbers has no
+    /// uncertainty. Valid while f is nearly linear over x ± u(x).
     ///
     /// ```
     /// use torqcomp_model::{Covariance, Estimates};
@@ -237,8 +237,8 @@ impl Estimates {
         self.derive_by(values.to_vec(), &slopes)
     }
 
-    /// Numbers that follow from these, given with their gradients (one row for each number, one entry for each of
-    /// these). One that depends on a number without an uncertainty, or on none that has one, has none itself.
+    /// Functions of the numbers, given by their values and gradients (one row per function, one entry per
+    /// number). One that depends on a number without an uncertainty, or on none with one, has none itself.
     #[must_use]
     pub fn derive_by<Row: AsRef<[f64]>>(&self, values: Vec<f64>, gradients: &[Row]) -> Self {
         let covariance = self.covariance.through(gradients);
@@ -246,7 +246,7 @@ impl Estimates {
     }
 }
 
-/// ∂f/∂x_i by central differences; leaves `x` as it was.
+/// ∂f/∂x_i by central differences; `x` is restored.
 pub(super) fn slope(f: impl Fn(&[f64]) -> f64, x: &mut [f64], i: usize, std: f64) -> f64 {
     let centre = x[i];
     let step = STEP * centre.abs().max(std);
@@ -255,6 +255,6 @@ pub(super) fn slope(f: impl Fn(&[f64]) -> f64, x: &mut [f64], i: usize, std: f64
     x[i] = centre - step;
     let (lower, below) = (x[i], f(x));
     x[i] = centre;
-    // The steps as the floats took them, not as asked.
+    // The steps after rounding, not as requested.
     (above - below) / (upper - lower)
 }

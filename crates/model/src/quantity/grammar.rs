@@ -1,17 +1,17 @@
-//! Grammar of unit text: signs → tokens → unit.
+//! Grammar of unit text: characters → tokens → unit.
 
 use super::error::QuantityError;
 use super::symbols::{self, Symbol};
 use super::unit::Unit;
 
-/// Longest unit text read. Real ones have some 20 letters.
+/// Maximum length of unit text. Real units have some 20 characters.
 const MAX_LENGTH: usize = 200;
-/// Deepest nesting of parentheses read.
+/// Maximum nesting of parentheses.
 const MAX_DEPTH: usize = 4;
-/// Greatest power read. The limits together keep the exponents far inside their range.
+/// Maximum power. The limits together keep the exponents far from overflow.
 const MAX_POWER: i32 = 9;
 
-/// Speeds in turns per minute, as recorders write them.
+/// Speeds in revolutions per minute, as recorders write them.
 const PER_MINUTE: [&str; 4] = ["1/min", "min^-1", "min-1", "/min"];
 /// Symbols of mass that are also used for force, with that force.
 const WEIGHTS: [(&[&str], &str); 4] = [
@@ -21,8 +21,8 @@ const WEIGHTS: [(&[&str], &str); 4] = [
     (&["g"], "gf"),
 ];
 
-/// A unit text with its masses as forces, and as masses beyond doubt: `in-lb` becomes `in-lbf` and `in-lbm`; `None`
-/// without a mass.
+/// A unit text with its masses read as forces, and as unambiguous masses: `in-lb` becomes `in-lbf` and `in-lbm`;
+/// `None` without a mass.
 pub(super) fn readings_of_weight(text: &str) -> Option<[String; 2]> {
     let plain = plain_signs(text.trim());
     let mut readings = [String::new(), String::new()];
@@ -47,7 +47,7 @@ pub(super) fn readings_of_weight(text: &str) -> Option<[String; 2]> {
     found.then_some(readings)
 }
 
-/// Whether a unit has a minute in it that is not that of a speed.
+/// Whether a unit contains a minute that is not part of a speed.
 pub(super) fn has_bare_minute(text: &str) -> bool {
     let plain = plain_signs(text.trim());
     let is_speed = ["1/min", "min^-1", "min-1"]
@@ -68,14 +68,14 @@ enum Token {
     Close,
 }
 
-/// Reads unit text into a unit. Empty text and `1` are the unit of pure numbers.
+/// Parses unit text. Empty text and `1` are the unit of pure numbers.
 pub(super) fn read(text: &str) -> Result<Unit, QuantityError> {
     if text.len() > MAX_LENGTH {
         return Err(syntax(text, "it is too long"));
     }
     let mut plain = plain_signs(text.trim());
     if PER_MINUTE.contains(&plain.as_str()) {
-        // Turns a minute: no angle is counted in rad per minute.
+        // Revolutions per minute: angles are not given in rad per minute.
         plain = "rpm".to_owned();
     }
     for speed in ["/(1/min)", "/(min^-1)", "/min^-1", "/min-1"] {
@@ -110,8 +110,8 @@ fn syntax(text: &str, problem: &'static str) -> QuantityError {
     }
 }
 
-/// Writes signs beyond ASCII in plain letters: µ and μ as `u`, Ω as `ohm`, ° as `deg`, ε as
-/// `strain`, superscripts as `^` and digits, the signs of multiplication as `*`.
+/// Replaces non-ASCII characters: µ and μ by `u`, Ω by `ohm`, ° by `deg`, ε by `strain`,
+/// superscripts by `^` and digits, multiplication signs by `*`.
 fn plain_signs(text: &str) -> String {
     let mut plain = String::with_capacity(text.len() + 8);
     let mut in_superscript = false;
@@ -162,7 +162,7 @@ impl<'a> Lexer<'a> {
             let Some(sign) = self.rest.chars().next() else {
                 return Ok(tokens);
             };
-            // A power written without `^` must touch what it raises: `m2`, `s-1`.
+            // A power without `^` must follow its base directly: `m2`, `s-1`.
             let touches = !gap && matches!(tokens.last(), Some(Token::Symbol(_) | Token::Close));
             let token = match sign {
                 '-' if touches && self.digit_after_minus() => self.power()?,
@@ -185,7 +185,7 @@ impl<'a> Lexer<'a> {
         }
     }
 
-    /// Takes one ASCII sign.
+    /// Consumes one ASCII character.
     fn sign(&mut self, token: Token) -> Token {
         self.rest = &self.rest[1..];
         token
@@ -195,7 +195,7 @@ impl<'a> Lexer<'a> {
         self.rest[1..].starts_with(|c: char| c.is_ascii_digit())
     }
 
-    /// Takes a signed integer.
+    /// Consumes a signed integer.
     fn power(&mut self) -> Result<Token, QuantityError> {
         let (negative, digits) = match self.rest.strip_prefix('-') {
             Some(digits) => (true, digits),
@@ -220,7 +220,7 @@ impl<'a> Lexer<'a> {
         Ok(Token::Power(if negative { -value } else { value }))
     }
 
-    /// Takes a word: a symbol of a unit, or `per`.
+    /// Consumes a word: a symbol of a unit, or `per`.
     fn symbol(&mut self) -> Result<Token, QuantityError> {
         let end = self.word_end();
         let word = &self.rest[..end];
@@ -228,7 +228,7 @@ impl<'a> Lexer<'a> {
             self.rest = &self.rest[end..];
             return Ok(Token::Per);
         }
-        // `g0` ends in a digit that is no power.
+        // The digit of `g0` is not a power.
         if word == "g" && self.rest[end..].starts_with('0') {
             self.rest = &self.rest[end + 1..];
             return Ok(Token::Symbol(self.find("g0")?));
@@ -243,7 +243,7 @@ impl<'a> Lexer<'a> {
         Ok(Token::Symbol(symbol))
     }
 
-    /// The mass in front of a squared length, as in `kgm2`: data sheets of motors write inertias so.
+    /// The mass before a squared length, as in `kgm2`: motor data sheets write inertias like this.
     fn mass_of_inertia(&self, word: &str) -> Option<&'static str> {
         let power = &self.rest[word.len()..];
         let is_squared = power.strip_prefix('^').unwrap_or(power).starts_with('2');
@@ -274,7 +274,7 @@ impl<'a> Lexer<'a> {
         None
     }
 
-    /// End of the word at the front, at least one sign long.
+    /// End of the leading word, at least one character.
     fn word_end(&self) -> usize {
         let letters = self
             .rest

@@ -1,4 +1,4 @@
-//! Kinds of quantity: which units fit, and which are printed.
+//! Kinds of quantity: which units are accepted, and which are printed.
 
 use super::dimension::Dimension;
 use super::error::QuantityError;
@@ -6,7 +6,7 @@ use super::grammar;
 use super::kind_table::{KindRow, PrintUnit, ROWS};
 use super::unit::{RatioOf, Unit};
 
-/// Units that results are printed in. All computation is in SI.
+/// Unit system of printed results. All computation is in SI.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum UnitSystem {
     /// SI units.
@@ -38,7 +38,7 @@ pub enum Kind {
     SecondMoment,
     /// Pressure, stress or modulus, Pa.
     Pressure,
-    /// Mass, kg. The one kind where `lb` is accepted.
+    /// Mass, kg. The only kind that accepts `lb`.
     Mass,
     /// Cycles or samples per second, Hz. `rad/s` converts by 1/2π, `rpm` by 1/60.
     Frequency,
@@ -68,17 +68,17 @@ pub enum Kind {
     LinearStiffness,
     /// Acceleration, m/s².
     Acceleration,
-    /// Strain, m/m. A bare number is refused, as it could mean strain or microstrain.
+    /// Strain, m/m. A bare number is rejected, as it could mean strain or microstrain.
     Strain,
     /// Output of a bridge over its excitation, V/V.
     VoltageRatio,
-    /// Pure number, such as a damping ratio. May stand without a unit.
+    /// Pure number, such as a damping ratio. The unit may be omitted.
     Ratio,
-    /// Output per input of the same kind, such as V/V. May stand without a unit.
+    /// Output per input of the same kind, such as V/V. The unit may be omitted.
     Gain,
-    /// Temperature on an absolute scale, K; °C and °F convert with their zero.
+    /// Temperature on an absolute scale, K; °C and °F are converted with their zero.
     TemperatureAbsolute,
-    /// Difference of temperatures, K; °C and °F convert by the size of the degree.
+    /// Difference of temperatures, K; °C and °F are converted by the size of the degree.
     TemperatureDifference,
     /// Strain per temperature difference, 1/K.
     ThermalExpansion,
@@ -120,7 +120,7 @@ impl Kind {
         self.row().example
     }
 
-    /// Unit that results of this kind are printed in.
+    /// Unit of printed results of this kind.
     ///
     /// ```
     /// use torqcomp_model::{Kind, UnitSystem};
@@ -145,8 +145,8 @@ impl Kind {
 
     /// A difference or uncertainty in SI units as a number in the unit of [`Kind::unit`].
     ///
-    /// Differs from [`Kind::to`] for an absolute temperature, where the zero of the scale drops
-    /// out of a difference.
+    /// Differs from [`Kind::to`] for an absolute temperature, where the zero of the scale cancels
+    /// in a difference.
     ///
     /// ```
     /// use torqcomp_model::{Kind, UnitSystem};
@@ -158,7 +158,7 @@ impl Kind {
         si_difference / self.print_unit(system).factor
     }
 
-    /// Reads a number with its unit and returns it in the SI unit of this kind.
+    /// Parses a number with its unit into the SI unit of this kind.
     ///
     /// # Errors
     /// [`QuantityError`] if the number cannot be read or is not finite, its unit is missing,
@@ -196,13 +196,14 @@ impl Kind {
         Ok(value)
     }
 
-    /// Reads a standard uncertainty of a quantity of this kind, in the SI unit of this kind.
+    /// Parses a standard uncertainty of a quantity of this kind into the SI unit of this kind.
     ///
-    /// Like [`Kind::parse`], but refuses a negative number and reads a degree as a difference. Percent are percent of the
-    /// value, `of`; of a ratio, which could be given in percent itself, only if it is.
+    /// Like [`Kind::parse`], but rejects a negative number and treats a degree as a difference. Percent means percent
+    /// of the value, `of`; for a ratio, which may itself be given in percent, percent is accepted only if the value is
+    /// in percent, too.
     ///
     /// # Errors
-    /// As [`Kind::parse`], [`QuantityError::NegativeUncertainty`] and [`QuantityError::AmbiguousPercent`].
+    /// As for [`Kind::parse`], [`QuantityError::NegativeUncertainty`] and [`QuantityError::AmbiguousPercent`].
     ///
     /// ```
     /// use torqcomp_model::Kind;
@@ -256,7 +257,7 @@ impl Kind {
         Ok(self.scale(unit, unit.trim())?.factor)
     }
 
-    /// Splits text into its number and its unit.
+    /// Splits text into number and unit.
     fn split(self, text: &str) -> Result<(f64, &str), QuantityError> {
         let trimmed = text.trim();
         if trimmed.is_empty() {
@@ -282,7 +283,7 @@ impl Kind {
         Ok((finite(text, number)?, unit.trim_start()))
     }
 
-    /// Refuses a minute in a damping that may count turns or radians.
+    /// Rejects a minute in a damping that may count turns or radians.
     fn refuse_bare_minute(self, unit_text: &str) -> Result<(), QuantityError> {
         if self != Self::AngularDamping || !grammar::has_bare_minute(unit_text) {
             return Ok(());
@@ -294,7 +295,7 @@ impl Kind {
         })
     }
 
-    /// Factor and zero from a unit to the SI unit of this kind.
+    /// Factor and zero offset from a unit to the SI unit of this kind.
     fn scale(self, text: &str, unit_text: &str) -> Result<Scale, QuantityError> {
         if unit_text.is_empty() && !matches!(self, Self::Ratio | Self::Gain) {
             return Err(QuantityError::MissingUnit {
@@ -329,7 +330,7 @@ impl Kind {
         };
         let is_other_ratio = match self {
             Self::Strain => unit.ratio_of() == Some(RatioOf::Voltages),
-            // A ratio of voltages cancels: only its symbols tell it from a torque.
+            // A ratio of voltages cancels: only its symbols distinguish it from a torque.
             Self::TorquePerRatio | Self::VoltageRatio => !unit.has_voltage(),
             Self::Torque => unit.has_voltage(),
             _ => false,
@@ -353,7 +354,7 @@ impl Kind {
     }
 }
 
-/// Kinds that data sheets also give upside down.
+/// Kinds that data sheets also give as reciprocals.
 const CONSTANTS: [Kind; 4] = [
     Kind::TorquePerVolt,
     Kind::TorquePerRatio,
@@ -362,18 +363,18 @@ const CONSTANTS: [Kind; 4] = [
 ];
 
 impl Kind {
-    /// Whether a number in that unit is one over a quantity of this kind.
+    /// Whether a number in this unit is the reciprocal of a quantity of this kind.
     fn is_inverse(self, number: f64, unit_text: &str) -> bool {
         let wanted = self.row().accepts[0].0;
         let is = |unit: Unit| unit.dimension() == wanted.power(-1);
         number != 0.0 && wanted != Dimension::NONE && Unit::parse(unit_text).is_ok_and(is)
     }
 
-    /// The error about a number in the inverse unit, with the number that is right.
+    /// The error for a number in the reciprocal unit, with the corrected number.
     fn inverted(self, text: &str, number: f64, unit_text: &str) -> QuantityError {
         let factor = Unit::parse(unit_text).map_or(1.0, |unit| unit.factor());
         let value = self.to(UnitSystem::Si, 1.0 / (number * factor));
-        // Six digits, without zeros at the end.
+        // Six digits, without trailing zeros.
         let short: f64 = format!("{value:.5e}").parse().unwrap_or(value);
         QuantityError::Inverted {
             text: text.trim().to_owned(),
@@ -398,7 +399,7 @@ fn finite(text: &str, value: f64) -> Result<f64, QuantityError> {
     }
 }
 
-/// Length of the decimal number at the front: `[+-] digits [. digits] [e [+-] digits]`.
+/// Length of the leading decimal number: `[+-] digits [. digits] [e [+-] digits]`.
 pub(super) fn number_length(text: &str) -> usize {
     let bytes = text.as_bytes();
     let digits_from = |start: usize| {
@@ -423,7 +424,7 @@ pub(super) fn number_length(text: &str) -> usize {
     end
 }
 
-/// True for the spellings of infinity and not-a-number that float syntax knows.
+/// Whether a text is a float spelling of infinity or NaN.
 fn names_non_finite(text: &str) -> bool {
     let first = text.split_whitespace().next().unwrap_or_default();
     first.parse::<f64>().is_ok_and(|number| !number.is_finite())

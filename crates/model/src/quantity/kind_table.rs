@@ -1,4 +1,4 @@
-//! Table of the kinds of quantity: name, example, dimensions accepted, print units.
+//! Table of the kinds of quantity: name, example, accepted dimensions, print units.
 
 use std::f64::consts::TAU;
 
@@ -6,7 +6,7 @@ use super::dimension::Dimension;
 use super::kind::Kind;
 use super::symbols::{FAHRENHEIT, FAHRENHEIT_ZERO, FOOT, INCH, POUND, POUND_FORCE, PSI, SLUG};
 
-/// A unit that results are printed in.
+/// A unit for printing results.
 #[derive(Debug)]
 pub(super) struct PrintUnit {
     pub(super) text: &'static str,
@@ -16,13 +16,13 @@ pub(super) struct PrintUnit {
     pub(super) zero: f64,
 }
 
-/// What is known of a kind.
+/// Row of the table for one kind.
 #[derive(Debug)]
 pub(super) struct KindRow {
     pub(super) kind: Kind,
     pub(super) name: &'static str,
     pub(super) example: &'static str,
-    /// Dimensions accepted, each with the SI units of the kind per SI unit of the dimension. The
+    /// Accepted dimensions, each with the SI units of the kind per SI unit of the dimension. The
     /// first is that of the SI print unit.
     pub(super) accepts: &'static [(Dimension, f64)],
     pub(super) si: PrintUnit,
@@ -176,7 +176,7 @@ pub(super) const ROWS: [KindRow; 32] = [
         "1/K", print("1/degF", 1.0 / FAHRENHEIT)),
 ];
 
-// `Kind as usize` is the place in the table; a row out of order does not compile.
+// `Kind as usize` is the table index; a misplaced row does not compile.
 const _: () = {
     let mut i = 0;
     while i < ROWS.len() {

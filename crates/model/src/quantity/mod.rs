@@ -1,7 +1,7 @@
 //! Numbers with units and with uncertainty.
 //!
-//! Text such as `"8.1e4 ft lbf/rad"` becomes an SI number through [`Kind::parse`]: the kind of
-//! quantity expected says which units fit. A number without its unit is refused.
+//! Text such as `"8.1e4 ft lbf/rad"` becomes an SI number through [`Kind::parse`]: the expected kind of quantity
+//! determines the accepted units. A number without its unit is rejected.
 //!
 //! # Grammar of unit text
 //!
@@ -12,19 +12,18 @@
 //! | `m^2`, `m²`, `m2`, `s^-1`, `s⁻¹`, `s-1` | power |
 //! | `N m/(rad/s)` | parentheses |
 //!
-//! A product after a division, as in `N m/rad s`, is refused: write `N m/(rad s)` or
-//! `N m s/rad`. Symbols are case-sensitive (`mN` is not `MN`), words (`volts`, `RPM`) are not.
+//! A product after a division, as in `N m/rad s`, is rejected: write `N m/(rad s)` or `N m s/rad`. Symbols are
+//! case-sensitive (`mN` is not `MN`), words (`volts`, `RPM`) are not.
 //!
 //! # Ratios
 //!
-//! `mV/V` and `ustrain` have no dimension, and a bridge makes them different things: [`Unit::ratio_of`] tells them apart.
-//! `%` and `ppm` alone say neither; `% V/V` and `% strain` do.
+//! `mV/V` and `ustrain` are both dimensionless, but mean different things for a bridge: [`Unit::ratio_of`]
+//! distinguishes them. `%` and `ppm` alone are neither; `% V/V` and `% strain` are.
 //!
 //! # Angles and cycles
 //!
-//! The radian is kept as a dimension of its own, and a hertz is one cycle of 2π rad per second.
-//! So `3700 rad/s` read as a frequency is 588.87 Hz and never 3700 Hz, and `10 Hz` read as an
-//! angular speed is 62.8 rad/s.
+//! The radian is a dimension of its own, and one hertz is one cycle of 2π rad per second. So `3700 rad/s` read as a
+//! frequency is 588.87 Hz, not 3700 Hz, and `10 Hz` read as an angular speed is 62.8 rad/s.
 
 mod dimension;
 mod error;

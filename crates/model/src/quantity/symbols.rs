@@ -43,22 +43,22 @@ pub(super) struct Symbol {
 }
 
 impl Symbol {
-    /// True for a pound or an ounce that may be a mass or a force.
+    /// Whether it is a pound or an ounce that may be a mass or a force.
     pub(super) fn is_bare_weight(&self) -> bool {
         self.names.contains(&"lb") || self.names.contains(&"oz")
     }
 
-    /// True for strain and what strain is a ratio of.
+    /// Whether it is strain or the ratio it stands for.
     pub(super) fn is_of_strain(&self) -> bool {
         self.dimension == LENGTH || self.words.iter().any(|word| word.ends_with("strain"))
     }
 
-    /// True for volts.
+    /// Whether it is a unit of voltage.
     pub(super) fn is_voltage(&self) -> bool {
         self.dimension == VOLTAGE
     }
 
-    /// True for hertz, which count cycles of a signal, unlike turns of a shaft.
+    /// Whether it is hertz, which counts cycles of a signal rather than turns of a shaft.
     pub(super) fn is_hertz(&self) -> bool {
         self.words.iter().any(|word| word.ends_with("hertz"))
     }
@@ -101,8 +101,8 @@ const fn temperature(names: Names, words: Names, factor: f64, zero: f64) -> Symb
     }
 }
 
-/// All units. The micro sign is written `u`, the ohm sign `ohm`, the degree sign `deg` and ε
-/// `strain`: the grammar replaces the signs before it looks here.
+/// All units. The grammar replaces special characters before the lookup, so the micro sign is `u`,
+/// the ohm sign `ohm`, the degree sign `deg` and ε `strain`.
 pub(super) const SYMBOLS: &[Symbol] = &[
     // Pure numbers.
     unit(&["%"], &["percent"], 1e-2, NONE),
@@ -321,7 +321,7 @@ pub(super) fn find(symbol: &str) -> Option<&'static Symbol> {
     })
 }
 
-/// Torques written as one word with what may be a mass, and the same with a force.
+/// Torques written as one word with a possible mass, and the same with a force.
 const OF_WEIGHTS: [(&str, &str); 9] = [
     ("kgm", "kgf m"),
     ("kgcm", "kgf cm"),
@@ -334,13 +334,13 @@ const OF_WEIGHTS: [(&str, &str); 9] = [
     ("inoz", "in ozf"),
 ];
 
-/// Known spelling nearest to an unknown one, if it is close enough to be meant.
+/// Known spelling nearest to an unknown one, if it is plausible.
 pub(super) fn nearest(symbol: &str) -> Option<&'static str> {
     let is_it = |(word, _): &&(&str, &str)| symbol.eq_ignore_ascii_case(word);
     if let Some((_, with_force)) = OF_WEIGHTS.iter().find(is_it) {
         return Some(with_force);
     }
-    // Two letters of three wrong is no resemblance; a wrong case alone always is one.
+    // Two wrong letters of three are no match; a difference in case alone always is one.
     let limit = 1 + symbol.chars().count() / 4;
     let lower = symbol.to_lowercase();
     SYMBOLS
@@ -371,7 +371,7 @@ mod tests {
                 assert!(seen.insert(word.to_lowercase()), "{word} is given twice");
             }
         }
-        // A word in lower case must not shadow an exact name of another unit either.
+        // A lower-case word must not shadow an exact name of another unit either.
         for row in SYMBOLS {
             for name in row.names {
                 assert_eq!(find(name), Some(row), "{name} finds another row");
@@ -394,7 +394,7 @@ mod tests {
         assert_eq!(nearest("lbff"), Some("lbf"));
         assert_eq!(nearest("newtns"), Some("newtons"));
         assert_eq!(nearest("xyzzy"), None);
-        // By spelling alone, "kgcm" is nearest to "kgfm", a hundred times as much.
+        // By spelling alone, "kgcm" is nearest to "kgfm", which is a hundred times larger.
         assert_eq!(nearest("kgcm"), Some("kgf cm"));
         assert_eq!(nearest("OzIn"), Some("ozf in"));
     }

@@ -8,19 +8,19 @@ use super::symbols::Symbol;
 
 /// A unit of measure, read from text.
 ///
-/// The grammar is that of the module [`quantity`](crate::quantity). A number in this unit times
-/// [`Unit::factor`] is the number in kg, m, s, A, K and rad. One hertz counts as one cycle of
-/// 2π rad per second.
+/// For the grammar see the module [`quantity`](crate::quantity). A number in this unit times
+/// [`Unit::factor`] is the number in kg, m, s, A, K and rad. One hertz is one cycle of 2π rad per
+/// second.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
     factor: f64,
     dimension: Dimension,
-    /// Kelvin at zero of the scale, not 0 only for a lone °C or °F.
+    /// Kelvin at zero of the scale, nonzero only for °C or °F alone.
     zero: f64,
     parts: UnitParts,
 }
 
-/// What a unit is made of, as far as its dimension does not show it.
+/// Properties of a unit not visible in its dimension.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct UnitParts {
     bare_weight: bool,
@@ -40,7 +40,7 @@ impl UnitParts {
     }
 }
 
-/// What a unit without a dimension is a ratio of.
+/// Kind of ratio expressed by a dimensionless unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RatioOf {
     /// Output of a bridge over its excitation: `mV/V`, `uV/V`, `% V/V`.
@@ -65,7 +65,7 @@ impl Unit {
         },
     };
 
-    /// Reads a unit. Empty text and `1` are the unit of pure numbers.
+    /// Parses a unit. Empty text and `1` are the unit of pure numbers.
     ///
     /// # Errors
     /// [`QuantityError`] if a symbol is unknown or the text does not follow the grammar.
@@ -81,10 +81,10 @@ impl Unit {
         grammar::read(text)
     }
 
-    /// The unit behind the number of a quantity such as `2.0012 mV/V`.
+    /// The unit of a quantity such as `2.0012 mV/V`.
     ///
     /// # Errors
-    /// As [`Unit::parse`].
+    /// As for [`Unit::parse`].
     ///
     /// ```
     /// use torqcomp_model::{RatioOf, Unit};
@@ -97,7 +97,8 @@ impl Unit {
         Self::parse(&text[number_length(text)..])
     }
 
-    /// A unit text with its masses as forces, and as masses beyond doubt; `None` without a mass.
+    /// A unit text with its masses read as forces, and as unambiguous masses; `None` without a
+    /// mass.
     ///
     /// ```
     /// use torqcomp_model::Unit;
@@ -119,27 +120,27 @@ impl Unit {
         self.dimension
     }
 
-    /// Temperature in K at the zero of the scale, for a lone °C or °F; 0 otherwise.
+    /// Temperature in K at the zero of the scale, for °C or °F alone; 0 otherwise.
     pub(super) fn zero(&self) -> f64 {
         self.zero
     }
 
-    /// True if `lb` or `oz` appears in the unit, which could be a mass or a force.
+    /// Whether the unit contains `lb` or `oz`, which could be a mass or a force.
     pub fn has_bare_weight(&self) -> bool {
         self.parts.bare_weight
     }
 
-    /// True if volts are part of the unit, even where they cancel.
+    /// Whether the unit contains volts, even where they cancel.
     pub(super) fn has_voltage(&self) -> bool {
         self.parts.voltage
     }
 
-    /// True for a frequency in hertz, false for a speed in rpm or rad/s.
+    /// Whether it is a frequency in hertz rather than a speed in rpm or rad/s.
     pub fn is_hertz(&self) -> bool {
         self.parts.hertz && self.dimension == Dimension::new([0, 0, -1, 0, 0, 1])
     }
 
-    /// What a unit without a dimension is a ratio of; `None` for a unit with a dimension.
+    /// Kind of ratio expressed by a dimensionless unit; `None` for a unit with a dimension.
     ///
     /// ```
     /// use torqcomp_model::{RatioOf, Unit};
@@ -161,7 +162,7 @@ impl Unit {
         })
     }
 
-    /// The unit of a symbol that stands alone, with the zero of its scale.
+    /// The unit of a single symbol, with the zero of its scale.
     pub(super) fn of_scale(symbol: &Symbol) -> Self {
         Self {
             zero: symbol.zero,
@@ -169,7 +170,7 @@ impl Unit {
         }
     }
 
-    /// The unit of a symbol inside a product: a degree is a difference there.
+    /// The unit of a symbol inside a product, where a degree is a difference.
     pub(super) fn of_factor(symbol: &Symbol) -> Self {
         Self {
             factor: symbol.factor,

@@ -1,27 +1,27 @@
-//! What an input does between its samples.
+//! Waveform of an input between its samples.
 
 use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-/// Course of the applied quantity from sample to sample.
+/// Waveform of the applied quantity between samples.
 ///
-/// A record of what acted, sampled behind an anti-alias filter, is band-limited. Values that were sent to a converter are
-/// not: it holds each until the next comes, or something draws straight lines between them. (A. V. Oppenheim,
-/// R. W. Schafer, *Discrete-Time Signal Processing*, 3rd ed. (2010), 4.8.3.)
+/// A record sampled behind an anti-alias filter is band-limited. Values sent to a converter are not: it either holds
+/// each until the next (zero-order hold) or is followed by linear interpolation. (A. V. Oppenheim, R. W. Schafer,
+/// *Discrete-Time Signal Processing*, 3rd ed. (2010), 4.8.3.)
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Between {
-    /// Nothing above half the sampling rate.
+    /// Nothing above the Nyquist frequency.
     #[default]
     BandLimited,
-    /// Straight lines.
+    /// Linear interpolation.
     StraightLines,
-    /// Each sample until the next one.
+    /// Zero-order hold.
     Held,
 }
 
 impl Between {
-    /// Every course, the usual one first.
+    /// All waveforms, the most common first.
     pub const ALL: [Self; 3] = [Self::BandLimited, Self::StraightLines, Self::Held];
 
     /// Its name in reports and on the command line.
@@ -34,9 +34,10 @@ impl Between {
         }
     }
 
-    /// What becomes of a line of the samples' spectrum, by its frequency in cycles a sample, `ν = f/f_s ≤ 1/2`: 1,
-    /// `sinc² ν` or `e^{−jπν} sinc ν`, with `sinc ν = sin(πν)/(πν)`. The images above half the sampling rate are
-    /// left out; what the stand makes of those of a held input is in its motion, by the exact response to steps.
+    /// Factor of a line of the samples' spectrum, by its frequency in cycles per sample, `ν = f/f_s ≤ 1/2`: 1,
+    /// `sinc² ν` or `e^{−jπν} sinc ν`, with `sinc ν = sin(πν)/(πν)`. The images above the Nyquist frequency are
+    /// left out; for a held input, the stand's response to them is included in its motion by the exact step
+    /// response.
     ///
     /// ```
     /// use torqcomp_model::simulate::Between;

@@ -1,4 +1,4 @@
-//! A sampled input, continued beyond its ends and refined between its samples.
+//! A sampled input, extended beyond its ends and interpolated between its samples.
 
 use std::sync::Arc;
 
@@ -9,9 +9,9 @@ use super::between::Between;
 
 /// A record of the applied quantity, prepared for simulation.
 ///
-/// Beyond an end where it repeats, the record is continued by its period, beyond others by point reflection; both fade
-/// out, so that the transform, which takes it for periodic, meets no step. What that makes up differs from
-/// what was there before the record by an initial state of the stand.
+/// An end at which the record is periodic is extended periodically, any other by point reflection; both extensions
+/// fade out, so that the transform, which treats it as periodic, sees no step. The difference between the extension
+/// and the true history acts as an initial state of the stand.
 pub struct Excitation {
     samples: Vec<f64>,
     rate_hz: f64,
@@ -28,11 +28,11 @@ pub struct Excitation {
 }
 
 impl Excitation {
-    /// Prepares a band-limited record, with that many steps from sample to sample for integration in time.
+    /// Prepares a band-limited record, with `substeps` integration steps per sample.
     #[must_use]
     pub fn new(samples: Vec<f64>, rate_hz: f64, start_s: f64, substeps: usize) -> Self {
         let count = samples.len();
-        // Integration needs a step before the record and two after it, however short it is.
+        // Integration needs one step before the record and two after it, even for a short record.
         let lead = (count / 16)
             .clamp(16, 2048)
             .min(count.saturating_sub(1))
@@ -42,7 +42,7 @@ impl Excitation {
         Self::continued(samples, (rate_hz, start_s), substeps, (lead, total), ends)
     }
 
-    /// The same of a record that is repeated without end: nothing is made up beyond its ends.
+    /// Prepares a record that repeats indefinitely, so that no extension is needed.
     #[must_use]
     pub fn periodic(samples: Vec<f64>, rate_hz: f64, start_s: f64, substeps: usize) -> Self {
         let whole = (0, samples.len());
@@ -94,19 +94,19 @@ impl Excitation {
         }
     }
 
-    /// The same record with another number of steps.
+    /// Sets the number of integration steps per sample.
     #[must_use]
     pub fn with_substeps(&self, substeps: usize) -> Self {
         self.refined(substeps, self.between)
     }
 
-    /// The same record with another course between its samples.
+    /// Sets the waveform between samples.
     #[must_use]
     pub fn with_between(&self, between: Between) -> Self {
         self.refined(self.substeps, between)
     }
 
-    /// Its course between its samples.
+    /// Waveform between samples.
     #[must_use]
     pub fn between(&self) -> Between {
         self.between
@@ -118,30 +118,30 @@ impl Excitation {
         &self.samples
     }
 
-    /// Samples a second.
+    /// Sampling rate in Hz.
     #[must_use]
     pub fn rate_hz(&self) -> f64 {
         self.rate_hz
     }
 
-    /// Time of the first sample.
+    /// Time of the first sample in s.
     #[must_use]
     pub fn start_s(&self) -> f64 {
         self.start_s
     }
 
-    /// Time between steps of integration in s.
+    /// Step of integration in s.
     pub(super) fn step_s(&self) -> f64 {
         1.0 / (self.rate_hz * self.substeps as f64)
     }
 
-    /// Steps of integration from sample to sample.
+    /// Integration steps per sample.
     #[must_use]
     pub fn substeps(&self) -> usize {
         self.substeps
     }
 
-    /// Spectrum of what acts, up to half the sampling rate.
+    /// Spectrum of the continuous input, up to the Nyquist frequency.
     #[must_use]
     pub fn spectrum(&self) -> &[Complex64] {
         &self.spectrum
@@ -153,14 +153,14 @@ impl Excitation {
         std::f64::consts::TAU * line as f64 * self.rate_hz / self.total as f64
     }
 
-    /// Excitation at the steps of integration, from one step before the first sample to two after the last, or, if it is
-    /// repeated, to two after its first sample comes again.
+    /// Excitation at the steps of integration, from one step before the first sample to two after the last, or, if
+    /// periodic, to two after the first sample recurs.
     pub(super) fn fine(&self) -> &[f64] {
         &self.fine
     }
 
-    /// Spectrum of a record of the same length, that follows from the input: where that repeats at its end, it does, too;
-    /// how it was before it begins is not known.
+    /// Spectrum of a record of the same length that is a response to the input: where the input is periodic at its end,
+    /// so is the response; the history before the record is unknown.
     #[must_use]
     pub fn transform(&self, samples: &[f64]) -> Vec<Complex64> {
         self.transform_with(samples, [None, self.periods[1]])
@@ -169,12 +169,12 @@ impl Excitation {
     fn transform_with(&self, samples: &[f64], periods: [Option<usize>; 2]) -> Vec<Complex64> {
         let mut extended = extend(samples, self.lead, self.total, periods);
         let mut spectrum = self.forward.make_output_vec();
-        // The lengths are those that the plan was made for.
+        // Cannot fail: the lengths match the plan.
         let _ = self.forward.process(&mut extended, &mut spectrum);
         spectrum
     }
 
-    /// The record of a spectrum.
+    /// The record with this spectrum.
     #[must_use]
     pub fn samples_of(&self, mut spectrum: Vec<Complex64>) -> Vec<f64> {
         let mut extended = self.backward.make_output_vec();
@@ -192,7 +192,7 @@ impl Excitation {
             .collect()
     }
 
-    /// What acts if each sample is held until the next one.
+    /// The input with each sample held until the next.
     fn staircase(&self, substeps: usize) -> Vec<f64> {
         let count = self.samples.len();
         let at = |node: usize| match (node.checked_sub(1), self.lead) {
@@ -204,7 +204,7 @@ impl Excitation {
         (0..self.nodes(substeps)).map(at).collect()
     }
 
-    /// Nodes of the integration, from one step before the first sample to two after the last.
+    /// Number of integration nodes, from one step before the first sample to two after the last.
     fn nodes(&self, substeps: usize) -> usize {
         match self.lead {
             0 => self.samples.len() * substeps + 3,
@@ -212,14 +212,14 @@ impl Excitation {
         }
     }
 
-    /// Interpolation of what acts: its spectrum, padded with zeros.
+    /// Interpolation of the continuous input by zero-padding its spectrum.
     fn refine(&self, of: &[Complex64], substeps: usize) -> Vec<f64> {
         let long = self.total * substeps;
         let plan = torqcomp_fourier::inverse(long);
         let mut spectrum = plan.make_input_vec();
         spectrum[..of.len()].copy_from_slice(of);
         if substeps > 1 && self.total.is_multiple_of(2) {
-            // The line at half the sampling rate stands for both signs of frequency.
+            // The Nyquist line represents both signs of frequency.
             spectrum[of.len() - 1] *= 0.5;
         }
         spectrum[0].im = 0.0;
@@ -235,8 +235,8 @@ impl Excitation {
     }
 }
 
-/// Continues a record at its ends, fading to zero over `lead` samples: by its period at the start and at the end where
-/// there is one, by point reflection otherwise.
+/// Extends a record at its ends, fading to zero over `lead` samples: periodically at an end with a period, by point
+/// reflection otherwise.
 fn extend(samples: &[f64], lead: usize, total: usize, periods: [Option<usize>; 2]) -> Vec<f64> {
     let mut extended = vec![0.0; total];
     let count = samples.len();
@@ -259,24 +259,24 @@ fn extend(samples: &[f64], lead: usize, total: usize, periods: [Option<usize>; 2
     extended
 }
 
-/// Samples that must repeat.
+/// Number of samples that must repeat.
 const REPEATED: usize = 512;
 /// Shortest period.
 const SHORTEST: usize = 64;
-/// Mean square by which a repeated piece may differ, over that of the record.
+/// Mean-square difference allowed between repetitions, relative to that of the record.
 const DIFFERS: f64 = 1e-4;
 
-/// Periods with which a record begins and ends, where it does.
+/// Periods at the start and end of a record, if any.
 fn periods(samples: &[f64]) -> [Option<usize>; 2] {
     let reversed: Vec<f64> = samples.iter().rev().copied().collect();
     [period(samples), period(&reversed)]
 }
 
-/// The period with which a record begins.
+/// Period at the start of a record.
 fn period(samples: &[f64]) -> Option<usize> {
     let size = samples.iter().map(|x| x * x).sum::<f64>() / samples.len() as f64;
     let piece = &samples[..REPEATED.min(samples.len() / 4)];
-    // A quiet beginning repeats anything quiet.
+    // A quiet start would match anything quiet.
     let energy = piece.iter().map(|x| x * x).sum::<f64>();
     if energy < 0.1 * size * piece.len() as f64 {
         return None;
@@ -293,7 +293,7 @@ fn period(samples: &[f64]) -> Option<usize> {
     (SHORTEST..samples.len().saturating_sub(piece.len())).find(repeats)
 }
 
-/// The least even length from `least` on that is a product of 2, 3 and 5.
+/// The smallest even length of at least `least` that is a product of 2, 3 and 5.
 fn quick_length(least: usize) -> usize {
     let mut length = least + least % 2;
     loop {

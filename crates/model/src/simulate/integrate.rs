@@ -1,9 +1,9 @@
-//! Integration of `x'' + 2ζω₀ x' + ω₀² (x + n(x, x', z)) = ω₀² G u` in time.
+//! Time integration of `x'' + 2ζω₀ x' + ω₀² (x + n(x, x', z)) = ω₀² G u`.
 //!
-//! The linear part is exact: from node to node by the matrix exponential, the input between nodes as the cubic
-//! through four of them. The torques `n` act at the nodes (`run`; `modes` for several modes), for the time of a whole step (Strang's
-//! splitting, SIAM J. Numer. Anal. 5 (1968), 506): second order in the step, stable for any size of the
-//! linear terms, and a torque that switches is switched by its own exact flow.
+//! The linear part is exact: from node to node by the matrix exponential, with the input between nodes as a cubic
+//! through four of them. The torques `n` act at the nodes (`run`; `modes` for several modes), each for a whole step
+//! (Strang splitting, SIAM J. Numer. Anal. 5 (1968), 506): second order in the step, stable for linear terms of any
+//! size, and a switching torque follows its own exact flow.
 
 use num_complex::Complex64;
 
@@ -20,15 +20,15 @@ pub struct MotionState {
     pub speed: f64,
 }
 
-/// Largest `ω₀ h` of a step; the error of the splitting is about `(ω₀ h)²/24` of the torques.
+/// Largest `ω₀ h` of a step; the splitting error is about `(ω₀ h)²/24` of the torques.
 const LARGEST_STEP: f64 = 0.1;
-/// Fewest steps from sample to sample: the cubic through an input of an eighth of the sampling rate is then within
-/// 6e-4 of it.
+/// Minimum number of steps per sample: the cubic is then within 6e-4 of an input at an eighth of the sampling
+/// rate.
 const FEWEST_SUBSTEPS: usize = 2;
-/// Most steps from sample to sample.
+/// Maximum number of steps per sample.
 const MOST_SUBSTEPS: usize = 64;
 
-/// Steps of integration from sample to sample for a stand of that natural frequency.
+/// Integration steps per sample for a stand of this natural frequency.
 ///
 /// ```
 /// // 590 Hz at 20 kHz: ω₀/f_s = 0.185, two steps of 0.093.
@@ -47,14 +47,14 @@ pub(super) struct LinearStep {
     b: f64,
     pub(super) c: f64,
     d: f64,
-    /// Whether the input stays as it is at a node until the next one.
+    /// Whether the input is constant from a node to the next.
     is_held: bool,
-    /// What inputs at the nodes −1, 0, 1, 2 add to `x` and `x'`.
+    /// Contributions of the input at the nodes −1, 0, 1, 2 to `x` and `x'`.
     to_x: [f64; 4],
     to_speed: [f64; 4],
 }
 
-/// Free motion after a time: the matrix exponential of the linear part.
+/// Free motion over a time: the matrix exponential of the linear part.
 pub(super) fn free(mode: &Mode, time_s: f64) -> [f64; 4] {
     let omega = mode.omega_rad_s;
     let sigma = mode.damping_ratio * omega;
@@ -91,7 +91,7 @@ pub(crate) fn free_motion(mode: &Mode, rate_hz: f64, count: usize) -> [Vec<f64>;
     [run(1.0, 0.0), run(0.0, mode.omega_rad_s)]
 }
 
-/// Nodes and weights of Gauss and Legendre on 0 to 1, exact to degree 11.
+/// Gauss–Legendre nodes and weights on 0 to 1, exact to degree 11.
 const GAUSS: [(f64, f64); 6] = [
     (0.033_765_242_898_423_99, 0.085_662_246_189_585_17),
     (0.169_395_306_766_867_74, 0.180_380_786_524_069_3),
@@ -105,7 +105,7 @@ impl LinearStep {
     pub(super) fn new(mode: &Mode, gain: f64, step_s: f64, between: Between) -> Self {
         let [a, b, c, d] = free(mode, step_s);
         if between == Between::Held {
-            // Of a constant input, what is not yet there falls as the free motion does.
+            // For a constant input, the distance to the equilibrium decays like the free motion.
             return Self {
                 a,
                 b,
@@ -149,7 +149,7 @@ impl LinearStep {
 }
 
 impl LinearStep {
-    /// The input at a part of the step.
+    /// The input at a fraction of the step.
     pub(super) fn input_at(&self, input: &[f64], part: f64) -> f64 {
         match self.is_held {
             true => input[1],
@@ -158,9 +158,9 @@ impl LinearStep {
     }
 }
 
-/// Response of the sampled motion to a held input, at an angular frequency in rad/s up to half the sampling rate: the images
-/// of the steps above that are in it. With the free motion `A` over a sample and the step response `B = (1 − A) (1, 0)` of
-/// displacement and speed, that of each mode is `(z − A)⁻¹ B` at `z = e^{jωT}`.
+/// Response of the sampled motion to a held input, at an angular frequency in rad/s up to the Nyquist frequency,
+/// including the images of the steps above it. With the free motion `A` over a sample and the step response
+/// `B = (1 − A) (1, 0)` of displacement and speed, that of each mode is `(z − A)⁻¹ B` at `z = e^{jωT}`.
 pub(crate) fn held_response(stand: &ModalResponse, step_s: f64) -> impl Fn(f64) -> Complex64 {
     let parts = stand.parts().iter();
     let parts: Vec<_> = parts
@@ -179,7 +179,7 @@ pub(crate) fn held_response(stand: &ModalResponse, step_s: f64) -> impl Fn(f64) 
     }
 }
 
-/// Shares of the nodes −1, 0, 1, 2 in the cubic through them, at a place between 0 and 1.
+/// Weights of the nodes −1, 0, 1, 2 in their interpolating cubic, at a position between 0 and 1.
 fn cubic(t: f64) -> [f64; 4] {
     [
         -t * (t - 1.0) * (t - 2.0) / 6.0,

@@ -1,12 +1,12 @@
-//! The motion of a stand under a given input, torques of its effects included: the first part of
+//! Motion of a stand for a given input, including the torques of its effects: the first part of
 //! [`Chain::simulate`](crate::Chain::simulate).
 //!
-//! Torques of the stand are integrated in time, everything linear is applied in the frequency domain, what
-//! gage and recorder do follows sample by sample. Between samples the input is band-limited, not a
-//! straight line, unless it is said to be ([`Between`]).
+//! Torques of the stand are integrated in time, everything linear is applied in the frequency domain, and gage and
+//! recorder follow sample by sample. Between samples the input is band-limited, not linearly interpolated, unless
+//! specified otherwise ([`Between`]).
 //!
-//! A record of any length is simulated piece by piece ([`Pieces`]); the answer to an input that repeats, once it has settled,
-//! is that of [`steady_answer`].
+//! A record of any length is simulated piece by piece ([`Pieces`]); [`steady_answer`] is the steady-state response to a
+//! periodic input.
 
 mod between;
 mod input;

@@ -5,10 +5,10 @@
 //! y_k'' + 2ζ_k ω_k y_k' + ω_k² y_k = ω_k² G u,   z_k'' + 2ζ_k ω_k z_k' + ω_k² z_k = −ω_k² g_k n(x, x')
 //! ```
 //!
-//! `y_k` is what the input drives and `z_k` what the torques `n` at the gage push; both are exact from node to node. A torque
-//! changes the speed of the gage at a node, and that of each `z_k` by its part `ω_k² g_k` in it. Sharp dry friction is
-//! constant over a step: as much as stops the gage at its end, and no more than its size (J. J. Moreau, *Numerical aspects
-//! of the sweeping process*, Comput. Methods Appl. Mech. Eng. 177 (1999), 329).
+//! `y_k` is driven by the input and `z_k` by the torques `n` at the gage; both are exact from node to node. A torque
+//! changes the speed of the gage at a node, and that of each `z_k` by its contribution `ω_k² g_k`. Sharp dry friction
+//! is constant over a step: as much as stops the gage at its end, but no more than its magnitude (J. J. Moreau,
+//! *Numerical aspects of the sweeping process*, Comput. Methods Appl. Mech. Eng. 177 (1999), 329).
 
 use super::input::Excitation;
 use super::integrate::{LinearStep, MotionState, free};
@@ -16,7 +16,7 @@ use super::run::{Acting, MotionProgress, kicked, remembered, shown};
 use super::side_by_side::{OngoingMotion, Stepped};
 use crate::modal::{ModalPart, ModalResponse};
 
-/// Where a mode stands.
+/// State of a mode.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct ModeMotion {
     /// `y`.
@@ -25,8 +25,8 @@ pub(super) struct ModeMotion {
     pushed: MotionState,
 }
 
-/// Where the modes of a stand begin: all of the motion is that of the one with the largest part at rest. A stand with one
-/// mode needs none.
+/// Initial states of the modes of a stand: the mode with the largest static contribution has all of the motion. Empty
+/// for a stand with one mode.
 pub(super) fn begin(stand: &ModalResponse, start: MotionState) -> Vec<ModeMotion> {
     if stand.only().is_some() {
         return Vec::new();
@@ -43,7 +43,7 @@ pub(super) fn begin(stand: &ModalResponse, start: MotionState) -> Vec<ModeMotion
     modes
 }
 
-/// A mode with its steps.
+/// A mode with its integration step.
 struct SteppedMode {
     part: ModalPart,
     step: LinearStep,
@@ -54,7 +54,8 @@ struct SteppedMode {
 }
 
 impl SteppedMode {
-    /// Goes on by a step; its part of displacement and speed of the gage then, `driving` being `G u` there.
+    /// Advances by a step; returns its contribution to displacement and speed of the gage, with `driving`
+    /// being `G u` at the end.
     fn advance(&mut self, window: &[f64], driving: f64) -> MotionState {
         self.motion.driven = self.step.advance(self.motion.driven, window);
         let MotionState { x, speed } = self.motion.pushed;
@@ -66,7 +67,7 @@ impl SteppedMode {
         self.at(driving)
     }
 
-    /// Its part of displacement and speed of the gage.
+    /// Its contribution to displacement and speed of the gage.
     fn at(&self, driving: f64) -> MotionState {
         let ModeMotion { driven, pushed } = self.motion;
         let (omega, ratio) = (self.part.mode.omega_rad_s, self.part.mode.damping_ratio);
@@ -78,13 +79,13 @@ impl SteppedMode {
         }
     }
 
-    /// `ω² g`: what a torque of one at the gage accelerates it by.
+    /// `ω² g`: acceleration by a unit torque at the gage.
     fn pushed_by(&self) -> f64 {
         self.part.mode.omega_rad_s * self.part.mode.omega_rad_s * self.at_gage
     }
 }
 
-/// The stand on its way through a record.
+/// Integration state of a stand with several modes.
 pub(super) struct ModalIntegrator<'a> {
     modes: Vec<SteppedMode>,
     /// `c G`.
@@ -92,10 +93,10 @@ pub(super) struct ModalIntegrator<'a> {
     gain: f64,
     shift: f64,
     step_s: f64,
-    /// What a torque of one changes the speed of the gage by at a node.
+    /// Change of the gage's speed at a node by a unit torque.
     impulse: f64,
     acting: Acting<'a>,
-    /// Sharp dry friction.
+    /// Magnitude of the sharp dry friction.
     dry: f64,
 }
 
@@ -130,7 +131,7 @@ impl<'a> Stepped<'a> for ModalIntegrator<'a> {
         (run, state)
     }
 
-    /// A step, and what the torques do at its end.
+    /// Advances by a step and applies the torques at its end.
     fn step(&mut self, state: MotionState, window: &[f64]) -> MotionState {
         let driving = self.gain * window[2];
         let mut parts = std::mem::take(&mut self.modes);
@@ -158,7 +159,7 @@ impl<'a> Stepped<'a> for ModalIntegrator<'a> {
 }
 
 impl ModalIntegrator<'_> {
-    /// Displacement and speed of the gage at the node that the run begins with.
+    /// Displacement and speed of the gage at the initial node.
     fn begin(&self, window: &[f64]) -> MotionState {
         let parts = self.modes.iter().map(|mode| mode.at(self.gain * window[1]));
         self.whole(
@@ -168,7 +169,7 @@ impl ModalIntegrator<'_> {
         )
     }
 
-    /// Those of all modes with what is above the band.
+    /// Sum over all modes and the compliance above the band.
     fn whole(&self, parts: impl Iterator<Item = MotionState>, u: f64, slope: f64) -> MotionState {
         let direct = MotionState {
             x: self.direct * u,
@@ -191,7 +192,7 @@ impl ModalIntegrator<'_> {
         kicked
     }
 
-    /// Dry friction over the step.
+    /// Applies dry friction over the step.
     fn rub(&mut self, mut moved: MotionState) -> MotionState {
         if self.dry == 0.0 {
             return moved;

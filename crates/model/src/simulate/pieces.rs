@@ -1,4 +1,4 @@
-//! The record for an input of any length, piece by piece.
+//! Simulation of an input of any length, piece by piece.
 
 use std::fmt;
 
@@ -7,18 +7,18 @@ use super::{Between, Excitation, MotionState, substeps};
 use crate::chain::Chain;
 use crate::effects::{Action, Stage};
 
-/// Samples of a piece.
+/// Samples per piece.
 const PIECE: usize = 1 << 17;
 /// Samples on either side of a piece that the links after the stand see.
 const SIDE: usize = 1 << 14;
-/// Size of an impulse response farther from its middle than the sides reach, over all of it, that is left out.
+/// Fraction of an impulse response beyond the reach of the sides that may be neglected.
 const LEFT_OUT: f64 = 1e-4;
-/// Relative change of the result at which the step of integration is fine enough.
+/// Relative change of the result below which the integration step is fine enough.
 pub(super) const FINE: f64 = 1e-5;
-/// Most steps from sample to sample.
+/// Maximum number of steps per sample.
 pub(super) const MOST_SUBSTEPS: usize = 256;
 
-/// The motion leaves all bounds.
+/// The motion diverges.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Diverges;
 
@@ -30,13 +30,13 @@ impl fmt::Display for Diverges {
 
 impl std::error::Error for Diverges {}
 
-/// The record of a stand that is at rest before its input, in memory that does not grow with the input: the motion goes on
-/// from piece to piece with all that it remembers, and what is linear sees 2^14 samples on either side of a piece.
+/// The record of a stand at rest before its input, in memory that does not grow with the input: the motion continues
+/// from piece to piece with its full state, and linear links see 2^14 samples on either side of a piece.
 ///
-/// The step of integration is halved until that changes a piece by less than 1e-5 of its rms.
+/// The integration step is halved until that changes a piece by less than 1e-5 of its RMS.
 ///
-/// A chain whose links after the stand reach farther (a drift, a play, a slow filter) needs the record as a whole; it is
-/// then kept until the end.
+/// A chain whose links after the stand reach farther (drift, backlash, a slow filter) needs the whole record, which is
+/// then stored until the end.
 ///
 /// ```
 /// use torqcomp_model::simulate::{Between, Pieces};
@@ -58,24 +58,24 @@ pub struct Pieces<'a> {
     chain: &'a Chain,
     rate_hz: f64,
     between: Between,
-    /// Samples of a piece, and on either side of it; none if the record cannot be cut.
+    /// Samples per piece, and on either side of it; `None` if the record cannot be split.
     cut: Option<[usize; 2]>,
-    /// Steps from sample to sample that are tried first.
+    /// Initial number of steps per sample.
     steps: usize,
-    /// Steps that a piece has needed.
+    /// Largest number of steps per sample needed so far.
     finest: usize,
-    /// The input that is still needed.
+    /// Input samples still needed.
     input: Vec<f64>,
-    /// What the gage shows at the first samples of it.
+    /// Gage signal at the first samples of `input`.
     shown: Vec<f64>,
-    /// The motion at the sample behind them.
+    /// State of the motion at the sample after them.
     progress: MotionProgress,
-    /// Samples of the input that are given back already.
+    /// Number of input samples already processed.
     given: usize,
 }
 
 impl<'a> Pieces<'a> {
-    /// Begins at rest.
+    /// Starts at rest.
     #[must_use]
     pub fn new(chain: &'a Chain, rate_hz: f64, between: Between) -> Self {
         Self {
@@ -92,10 +92,10 @@ impl<'a> Pieces<'a> {
         }
     }
 
-    /// Takes samples of the input and appends the record as far as it is known now.
+    /// Takes input samples and appends the part of the record now known.
     ///
     /// # Errors
-    /// If the motion leaves all bounds.
+    /// If the motion diverges.
     pub fn push(&mut self, input: &[f64], record: &mut Vec<f64>) -> Result<(), Diverges> {
         for part in input.chunks(SIDE) {
             self.input.extend_from_slice(part);
@@ -108,11 +108,11 @@ impl<'a> Pieces<'a> {
         Ok(())
     }
 
-    /// Appends the rest of the record; the steps of integration from sample to sample. Fewer than two samples in all have
-    /// no record.
+    /// Appends the rest of the record and returns the integration steps per sample. Fewer than two samples in total
+    /// give no record.
     ///
     /// # Errors
-    /// If the motion leaves all bounds.
+    /// If the motion diverges.
     pub fn finish(mut self, record: &mut Vec<f64>) -> Result<usize, Diverges> {
         if self.input.len() > 1 {
             self.give(self.input.len(), 0, record)?;
@@ -120,9 +120,9 @@ impl<'a> Pieces<'a> {
         Ok(self.finest)
     }
 
-    /// Gives the record up to a sample of the input that is in memory; the next piece sees `side` samples before it.
+    /// Outputs the record up to a sample of the input in memory; the next piece sees `side` samples before it.
     fn give(&mut self, end: usize, side: usize, record: &mut Vec<f64>) -> Result<(), Diverges> {
-        // The motion goes on where the input of this piece and the next are both far from their ends.
+        // The motion is handed over where it is far from the ends of both this piece and the next.
         let next = end - side;
         let samples = std::mem::take(&mut self.input);
         let input =
@@ -156,7 +156,7 @@ impl<'a> Pieces<'a> {
         Ok(())
     }
 
-    /// The record for the input in memory, what the gage shows, and the motion at the sample `next`.
+    /// The record for the input in memory, the gage signal, and the motion at the sample `next`.
     fn run(&self, input: &Excitation, next: usize) -> (Vec<f64>, Vec<f64>, MotionProgress) {
         let mut progress = self.progress.clone();
         let mut shown = self.shown.clone();
@@ -173,7 +173,7 @@ impl<'a> Pieces<'a> {
     }
 }
 
-/// Whether the links after the stand see no farther than the sides of a piece.
+/// Whether the links after the stand reach no farther than the sides of a piece.
 fn is_local(chain: &Chain, rate_hz: f64, side: usize) -> bool {
     let after = || {
         chain
@@ -193,14 +193,14 @@ fn is_local(chain: &Chain, rate_hz: f64, side: usize) -> bool {
     let mut spectrum = plan.make_input_vec();
     for (k, bin) in spectrum.iter_mut().enumerate() {
         let hz = k as f64 * rate_hz / size as f64;
-        // The motion that comes to them has little above the natural frequency.
+        // The motion has little content above the natural frequency.
         let motion = 1.0 + (hz / chain.stand.highest_hz()).powi(2);
         *bin = chain.response_of(hz, |link| link.stage > Stage::Stand) / motion;
     }
     spectrum[0].im = 0.0;
     spectrum[size / 2].im = 0.0;
     let mut impulse = plan.make_output_vec();
-    // The lengths are those that the plan was made for.
+    // Cannot fail: the lengths match the plan.
     let _ = plan.process(&mut spectrum, &mut impulse);
     let energy = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>();
     energy(&impulse[side..size - side]) <= LEFT_OUT * LEFT_OUT * energy(&impulse)
@@ -233,7 +233,7 @@ mod tests {
         Chain::new(modes.unwrap(), 1.0).with_links([friction])
     }
 
-    /// Two tones and noise of a tenth.
+    /// Two tones and 10 % noise.
     fn input(count: usize) -> Vec<f64> {
         let mut state = 1_u64;
         let mut noise = || {
@@ -248,8 +248,8 @@ mod tests {
             .collect()
     }
 
-    /// The record piece by piece is that of the whole, whatever the effects remember; the pieces begin elsewhere than
-    /// the input that is pushed.
+    /// Simulation piece by piece equals that of the whole, whatever the effects remember; the piece boundaries differ
+    /// from those of the pushed input.
     #[test]
     fn pieces_make_the_whole() {
         let [piece, side] = [1 << 14, 1 << 12];

@@ -1,4 +1,4 @@
-//! The motion with the torques of the stand, node by node.
+//! Motion with the torques of the stand, node by node.
 
 use super::input::Excitation;
 use super::integrate::{LinearStep, MotionState, free};
@@ -7,38 +7,38 @@ use super::side_by_side::{OngoingMotion, Stepped};
 use crate::effects::{Memory, Mode, Torque};
 use crate::modal::ModalResponse;
 
-/// Torques in the stand, each with whether the gage shows it.
+/// Torques in the stand, each with a flag for whether the gage shows it.
 pub(crate) type Torques<'a> = Vec<(&'a dyn Torque, bool)>;
 
-/// The stand on its way through a record.
+/// Integration state of a stand with one mode.
 pub(super) struct Integrator<'a> {
     mode: Mode,
     gain: f64,
     step: LinearStep,
     step_s: f64,
-    /// What a torque of one changes the speed by at a node.
+    /// Change of speed at a node by a unit torque.
     impulse: f64,
-    /// What acts at the nodes, sharp dry friction left out, and what it remembers.
+    /// Torques at the nodes except sharp dry friction, with their memory.
     acting: Acting<'a>,
-    /// Displacement by a constant load.
+    /// Displacement under a constant load.
     shift: f64,
-    /// Sharp dry friction, and the direction that the stand slides in: 0 while it sticks.
+    /// Sharp dry friction, and the direction of sliding: 0 while it sticks.
     dry: f64,
     direction: f64,
 }
 
-/// Where a motion stands: all that what follows depends on, besides the input.
+/// State of a motion: with the input, it determines all that follows.
 #[derive(Debug, Clone)]
 pub(crate) struct MotionProgress {
     state: MotionState,
     pub(super) memories: Vec<Memory>,
     direction: f64,
-    /// Where each mode stands, if there are several.
+    /// State of each mode, if there are several.
     pub(super) modes: Vec<ModeMotion>,
 }
 
 impl MotionProgress {
-    /// Where the modes of a stand are, which is all that its motion depends on.
+    /// The state of a stand with several modes.
     pub(super) fn of_modes(memories: Vec<Memory>, modes: Vec<ModeMotion>) -> Self {
         Self {
             state: MotionState::default(),
@@ -48,8 +48,8 @@ impl MotionProgress {
         }
     }
 
-    /// A motion that begins. A load that does not change, and so is not in the input, shifts the displacement that the
-    /// torques see.
+    /// Initial state of a motion. A constant load, which is not in the input, shifts the displacement seen by the
+    /// torques.
     pub(crate) fn begin(
         torques: &Torques<'_>,
         (stand, start): (&ModalResponse, MotionState),
@@ -70,16 +70,16 @@ impl MotionProgress {
     }
 }
 
-/// The torques that act, whether the gage shows them, and what they remember.
+/// The active torques, whether the gage shows them, and their memory.
 pub(super) type Acting<'a> = Vec<((&'a dyn Torque, bool), Memory)>;
 
-/// What they remember by now.
+/// Current memory of the torques.
 pub(super) fn remembered(acting: &Acting<'_>) -> Vec<Memory> {
     acting.iter().map(|(_, memory)| *memory).collect()
 }
 
-/// A motion at a node after what the torques do there: each changes the speed, of which `change` came with the step, by itself
-/// times `impulse`.
+/// State at a node after the torques have acted: each changes the speed by its value times `impulse`; `change` is the
+/// change of speed over the step.
 #[inline]
 pub(super) fn kicked(
     acting: &mut Acting<'_>,
@@ -95,7 +95,7 @@ pub(super) fn kicked(
     MotionState { x: moved.x, speed }
 }
 
-/// Torques that the gage shows beside the displacement.
+/// Torques that the gage shows in addition to the displacement.
 pub(super) fn shown(acting: &mut Acting<'_>, state: MotionState, shift: f64) -> f64 {
     let shown = acting.iter_mut().filter(|((_, shown), _)| *shown);
     shown
@@ -154,13 +154,13 @@ impl Integrator<'_> {
         self.kick(moved, moved.speed - state.speed)
     }
 
-    /// What the torques do at a node.
+    /// Applies the torques at a node.
     #[inline]
     fn kick(&mut self, moved: MotionState, change: f64) -> MotionState {
         kicked(&mut self.acting, moved, self.shift, change, self.impulse)
     }
 
-    /// Sum of the torques, dry friction left out, at rest.
+    /// Sum of the torques at rest, without dry friction.
     fn held(&mut self, x: f64) -> f64 {
         self.acting
             .iter_mut()
@@ -168,7 +168,8 @@ impl Integrator<'_> {
             .sum()
     }
 
-    /// A step of a stand that sticks: it is let go where the rest of the torques exceeds the friction.
+    /// A step of a sticking stand, which is released where the rest of the torques exceeds the
+    /// friction.
     fn stick(&mut self, state: MotionState, window: &[f64]) -> MotionState {
         let rest = MotionState {
             x: state.x,
@@ -181,7 +182,7 @@ impl Integrator<'_> {
         rest
     }
 
-    /// A step of a stand that slides: friction is a constant torque until the speed changes sign; there the stand
+    /// A step of a sliding stand: friction is a constant torque until the speed changes sign; there the stand
     /// sticks or slides back.
     fn slide(&mut self, state: MotionState, window: &[f64]) -> MotionState {
         let friction = -self.dry * self.direction;
@@ -207,7 +208,7 @@ impl Integrator<'_> {
             self.direction = 0.0;
             return rest;
         }
-        // For the rest of the step friction has the other sign.
+        // For the rest of the step friction has the opposite sign.
         let [a, _, c, _] = free(&self.mode, (1.0 - part) * self.step_s);
         let back = MotionState {
             x: moved.x - 2.0 * friction * (1.0 - a),

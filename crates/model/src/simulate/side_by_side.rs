@@ -1,7 +1,7 @@
-//! Motions under one input, integrated side by side.
+//! Parallel integration of several motions for one input.
 //!
-//! Each step of a motion waits for the one before it. Several motions that take their steps in turn, as where a fit moves its
-//! parameters one by one, keep the processor busy meanwhile, and each comes to the same numbers as alone.
+//! Each step of a motion depends on the previous one. Stepping several motions alternately, as for the finite
+//! differences of a fit, keeps the processor busy meanwhile; each gives the same numbers as alone.
 
 use std::ops::Range;
 
@@ -11,19 +11,19 @@ use super::modes::ModalIntegrator;
 use super::run::{Integrator, MotionProgress, Torques};
 use crate::modal::ModalResponse;
 
-/// A stand, and where its motion stands.
+/// A stand and the state of its motion.
 pub(crate) struct OngoingMotion<'a> {
     pub(crate) stand: &'a ModalResponse,
     pub(crate) gain: f64,
-    /// Displacement by a constant load.
+    /// Displacement under a constant load.
     pub(crate) shift: f64,
     pub(crate) torques: &'a Torques<'a>,
     pub(crate) progress: &'a mut MotionProgress,
 }
 
-/// A motion on its way from node to node.
+/// A motion stepped from node to node.
 pub(super) trait Stepped<'a>: Sized {
-    /// Goes on from where a motion stands, at the node in the second place of a window; with its state there.
+    /// Resumes from a motion's progress, at the second node of the window; also returns the state there.
     fn resume(
         motion: &OngoingMotion<'a>,
         input: &Excitation,
@@ -33,15 +33,15 @@ pub(super) trait Stepped<'a>: Sized {
     /// The state at the next node.
     fn step(&mut self, state: MotionState, window: &[f64]) -> MotionState;
 
-    /// What the gage shows.
+    /// Gage signal.
     fn shown(&mut self, state: MotionState) -> f64;
 
-    /// Where it stands at the end.
+    /// Progress at the end.
     fn end(self, state: MotionState) -> MotionProgress;
 }
 
-/// What the gage shows of each motion at some samples of the input; its progress is that at the first of them, and afterwards
-/// that at the sample behind the last. Once a motion is not finite the rest of it is NaN.
+/// Gage signal of each motion at some samples of the input; `progress` is that at the first of them, and on return that
+/// at the sample after the last. Once a motion is not finite, the rest of it is NaN.
 pub(crate) fn integrate(
     motions: &mut [OngoingMotion<'_>],
     input: &Excitation,
@@ -59,7 +59,7 @@ pub(crate) fn integrate(
     shown.collect()
 }
 
-/// The same of motions of one kind, four at a time as long as there are so many.
+/// Integrates motions of one kind, four at a time while there are that many.
 fn in_turn<'a, S: Stepped<'a>>(
     motions: &mut [OngoingMotion<'a>],
     input: &Excitation,
@@ -78,7 +78,7 @@ fn in_turn<'a, S: Stepped<'a>>(
     fours.chain(twos).chain(ones).collect()
 }
 
-/// The same of so many motions.
+/// Integrates `N` motions together.
 fn together<'a, S: Stepped<'a>, const N: usize>(
     motions: &mut [OngoingMotion<'a>; N],
     input: &Excitation,
@@ -104,7 +104,7 @@ fn together<'a, S: Stepped<'a>, const N: usize>(
         let last = ((sample + 1) * substeps + 3).min(nodes.len());
         for window in nodes[sample * substeps..last].windows(4) {
             for k in 0..N {
-                // One that has left all bounds stays where it is.
+                // A diverged motion is not stepped further.
                 if samples[k].len() > sample {
                     states[k] = stepped[k].step(states[k], window);
                 }
@@ -130,7 +130,7 @@ mod tests {
     use crate::modal::{ModalPart, ModalResponse};
     use crate::simulate::Excitation;
 
-    /// Of one mode, of two, without torques, and one that leaves all bounds.
+    /// With one mode, with two, without torques, and one that diverges.
     #[test]
     fn motions_together_are_what_each_is_alone() {
         let part = |times: f64, share| ModalPart {

@@ -1,4 +1,4 @@
-//! The answer to an input that repeats, once it has settled.
+//! Steady-state response to a periodic input.
 
 use std::fmt;
 
@@ -7,23 +7,23 @@ use super::run::MotionProgress;
 use super::{Between, Excitation, MotionState, substeps};
 use crate::chain::Chain;
 
-/// Most repetitions until the motion has settled.
+/// Maximum number of repetitions until the motion has settled.
 const MOST_REPETITIONS: usize = 2000;
-/// Relative change from one repetition to the next that is that of rounding.
+/// Relative change between repetitions that counts as rounding.
 const ROUNDING: f64 = 1e-12;
-/// Repetitions in a row that must have settled: a beat comes near itself once in a while.
+/// Consecutive repetitions that must have settled, as a beat comes close to itself once in a while.
 const SETTLED: usize = 3;
 /// Repetitions of the settled motion that the links after the stand see; the last is the record.
 const SEEN: usize = 3;
 
-/// Why an input that repeats has no steady answer.
+/// Reason why a periodic input has no steady-state response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NoSteadyAnswer {
-    /// The motion leaves all bounds.
+    /// The motion diverges.
     Diverges,
-    /// The motion does not repeat with the input.
+    /// The motion is not periodic with the input.
     Wanders,
-    /// What comes after the stand changes with the time since the record began.
+    /// A link after the stand depends on the time since the record began.
     Drifts,
 }
 
@@ -48,14 +48,14 @@ impl fmt::Display for NoSteadyAnswer {
 
 impl std::error::Error for NoSteadyAnswer {}
 
-/// The record of a stand over one repetition of its input, one period or a whole number of them, when it has been repeated
-/// for so long that the answer no longer changes; the steps of integration from sample to sample.
+/// Steady-state record of a stand over one repetition of its input (one period or a whole number of them), and the
+/// integration steps per sample.
 ///
-/// The motion is integrated until what is still to come of its changes, as a geometric series, is below 1e-5 of its
-/// rms, and the step of integration is halved until that changes the record by less than 1e-5.
+/// The motion is integrated until its remaining change, extrapolated as a geometric series, is below 1e-5 of its RMS,
+/// and the integration step is halved until that changes the record by less than 1e-5.
 ///
 /// # Errors
-/// If there is no such answer.
+/// If there is no steady-state response.
 ///
 /// ```
 /// use std::f64::consts::TAU;
@@ -90,7 +90,7 @@ pub fn steady_answer(
     recorded(chain, &input, &shown).map(|record| (record, steps))
 }
 
-/// What the gage shows of the settled motion over one repetition; `progress` is that at its end.
+/// Gage signal of the settled motion over one repetition; `progress` is the state at its end.
 fn settle(
     chain: &Chain,
     input: &Excitation,
@@ -109,7 +109,7 @@ fn settle(
     for _ in 1..MOST_REPETITIONS {
         let (shown, size) = next()?;
         let now = change(&shown, &last);
-        // The changes to come: a geometric series.
+        // The remaining change, as a geometric series.
         let to_come = now * now / (before - now);
         let is_settled = now < before && to_come <= FINE * size || now <= ROUNDING * size;
         settled = if is_settled { settled + 1 } else { 0 };
@@ -121,7 +121,7 @@ fn settle(
     Err(NoSteadyAnswer::Wanders)
 }
 
-/// What the links after the stand make of the settled motion.
+/// The settled motion passed through the links after the stand.
 fn recorded(chain: &Chain, input: &Excitation, shown: &[f64]) -> Result<Vec<f64>, NoSteadyAnswer> {
     let applied = input.samples().repeat(SEEN);
     let applied = Excitation::periodic(applied, input.rate_hz(), 0.0, 1);
@@ -153,7 +153,7 @@ mod tests {
     use crate::effects::{Effect, Mode};
     use crate::simulate::tests::{MODE, RATE_HZ, chain};
 
-    /// Not a product of small primes, and odd.
+    /// Odd, and not a product of small primes.
     const PERIOD: usize = 1997;
     fn period() -> Vec<f64> {
         let turn = |i: usize, k: f64| TAU * k * i as f64 / PERIOD as f64;
@@ -161,7 +161,7 @@ mod tests {
         (0..PERIOD).map(tones).collect()
     }
 
-    /// The twentieth of twenty periods that begin at rest.
+    /// Against the last of twenty periods that start at rest.
     #[test]
     fn it_is_where_a_long_record_ends() {
         let cases: [&[(&str, &str, &[f64])]; 5] = [

@@ -1,4 +1,4 @@
-//! The simulator against closed forms and against an independent integrator at a far finer step.
+//! The simulator against closed-form solutions and an independent integrator with a far finer step.
 
 use std::f64::consts::TAU;
 
@@ -16,7 +16,7 @@ pub(super) const MODE: Mode = Mode {
 /// Tones of the input: amplitude, frequency, phase. Their sum and its slope are zero at the start.
 const TONES: [(f64, f64); 4] = [(1.0, 80.0), (0.8, 310.0), (0.7, 620.0), (0.4, 1430.0)];
 
-/// Excitation that begins and ends smoothly, so that it is band-limited as it stands.
+/// An input that starts and ends smoothly, so that it is practically band-limited.
 fn input_at(time_s: f64) -> f64 {
     let length_s = COUNT as f64 / RATE_HZ;
     let fade = (0.5 * TAU * (time_s / length_s).clamp(0.0, 1.0))
@@ -44,7 +44,7 @@ fn model(effect: &str, form: &str, values: &[f64]) -> Chain {
     with(Effect::named(effect).unwrap(), form, values)
 }
 
-/// A law beside the list.
+/// A law from outside the list of effects.
 fn rival(law: &str, form: &str, values: &[f64]) -> Chain {
     let found = RIVALS.iter().find(|rival| rival.name == law);
     with(found.unwrap(), form, values)
@@ -64,7 +64,7 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
     (sum / f64::from(count)).sqrt()
 }
 
-/// Runge's and Kutta's fourth-order rule on `(x, x', z)` with steps of a 200th of a sample.
+/// Classical fourth-order Runge–Kutta on `(x, x', z)` with steps of a 200th of a sample.
 fn oracle(rates: impl Fn(f64, [f64; 3]) -> [f64; 3]) -> Vec<f64> {
     const FINE: usize = 200;
     let h = 1.0 / (RATE_HZ * FINE as f64);
@@ -104,7 +104,7 @@ fn both_ways_of_the_linear_stand_agree_with_the_oracle() {
     let truth = oracle(|t, s| [s[1], linear(t, s), 0.0]);
     let in_time = error(&plain(), &truth, 4);
     assert!(in_time < 4e-5, "{in_time:e}");
-    // What the record is continued by backwards is forgotten in the second half.
+    // By the second half, the effect of the backward extension has decayed.
     let through_spectrum = plain().simulate(&input(4), MotionState::default());
     let late = COUNT / 2;
     let difference = through_spectrum[late..]
@@ -115,7 +115,7 @@ fn both_ways_of_the_linear_stand_agree_with_the_oracle() {
     assert!(error < 1e-6, "{error:e}");
 }
 
-/// Two modes with residues out of phase, and compliance above them: in time as through the spectrum.
+/// Two modes with complex residues, and compliance above them: time domain against frequency domain.
 #[test]
 fn several_modes_in_time_are_their_response() {
     let part = |hz: f64, residue, quadrature| ModalPart {
@@ -141,11 +141,11 @@ fn several_modes_in_time_are_their_response() {
     assert!(error < 1e-4, "{error:e}");
 }
 
-/// The input as it goes from sample to sample in other ways, put to the oracle as it is.
+/// Other input waveforms between samples; the reference integrates the waveform directly.
 #[test]
 fn held_samples_and_straight_lines_agree_with_the_oracle() {
     let sample = |i: f64| input_at(i.clamp(0.0, (COUNT - 1) as f64) / RATE_HZ);
-    // The middle of an oracle's step tells the sample that it lies in.
+    // The midpoint of a step of the reference determines the sample that it lies in.
     let held = |place: f64| sample((place + 1e-9).floor());
     let line = |place: f64| {
         let part = place - place.floor();
@@ -187,7 +187,7 @@ fn free_motion_is_the_closed_form() {
     }
 }
 
-/// Error at two steps, which tells the order.
+/// The errors at two step sizes show the order of convergence.
 fn converges(model: &Chain, truth: &[f64], at_four: f64, at_sixteen: f64) {
     let (coarse, fine) = (error(model, truth, 4), error(model, truth, 16));
     println!("{coarse:e} {fine:e}");
@@ -277,8 +277,9 @@ fn hysteresis() {
     );
 }
 
-/// Sharp friction by Heun's rule at a 400th of a sample: between sign changes a constant torque. A step in which the speed
-/// would change sign ends where it is zero; there the stand stays unless the rest of the torques exceeds the friction.
+/// Sharp friction by Heun's method at a 400th of a sample: a constant torque between sign changes. A step in which the
+/// speed would change sign ends where it is zero; there the stand stays unless the rest of the torques exceeds the
+/// friction.
 fn dry_oracle(friction: f64) -> Vec<f64> {
     let step = 1.0 / (RATE_HZ * 400.0);
     let limit = MODE.omega_rad_s.powi(2) * friction;
@@ -323,7 +324,7 @@ fn sharp_friction() {
     }
 }
 
-/// A stand that friction holds does not creep or chatter.
+/// A stand held by friction does not creep or chatter.
 #[test]
 fn a_stand_that_sticks_stays() {
     let held = model("coulomb-friction", "sharp", &[100.0]);
@@ -401,8 +402,8 @@ fn distortions_are_inverted() {
     assert!(Stage::Stand < Stage::Dynamics && Stage::Gage < Stage::Chain);
 }
 
-/// Of levels that are held, the stand with three samples to a turn does exactly what the closed form of its steps says, in either
-/// way of computing.
+/// With held levels and three samples per turn, the stand's response equals the closed-form step response, whichever
+/// way it is computed.
 #[test]
 fn held_levels_give_the_closed_form() {
     let (rate_hz, damping_ratio) = (100.0, 0.2);
@@ -431,7 +432,8 @@ fn held_levels_give_the_closed_form() {
     let chain = Chain::new(mode, 1.0);
     let integrated = chain.simulate_from(&input, MotionState::default());
     let responded = chain.simulate(&input, MotionState::default());
-    // The response sees what continues the record backwards, which has died out after ten turns.
+    // The frequency-domain result includes the backward extension, which has decayed after ten
+    // turns.
     for i in 60..560 {
         let exact = exact(i);
         assert!((integrated[i] - exact).abs() < 1e-11, "{i}");

@@ -1,4 +1,4 @@
-//! The equation of one line, and its derivatives by all parameters.
+//! The equation of one line, and its derivatives with respect to all parameters.
 
 use num_complex::Complex64;
 
@@ -10,9 +10,9 @@ use crate::identify::Pole;
 /// Degree of the smooth part of the transient.
 const DEGREE: usize = 3;
 
-/// Order of the parameters: first those of a record's transient (residues, then the smooth part, real and imaginary parts
-/// alternating), then the shared ones (σ and ω of each mode, the delay, the linear parameters of the response); the
-/// residual comes last.
+/// Order of the parameters: first those of a record's transient (residues, then the smooth part, with alternating real
+/// and imaginary parts), then the shared ones (σ and ω of each mode, the delay, the linear parameters of the response);
+/// the residual comes last.
 pub(super) struct Parameters<'a> {
     shape: &'a Data,
     /// Number of modes.
@@ -34,7 +34,7 @@ pub(super) struct ParameterValues {
 }
 
 impl ParameterValues {
-    /// The averaged response, without transients.
+    /// Start values: the averaged response, without transients.
     pub fn start(layout: &Parameters, modal: &Modal, records: usize) -> Self {
         Self {
             poles: modal.poles.clone(),
@@ -70,12 +70,12 @@ impl<'a> Parameters<'a> {
         self.searched() + 2 * self.modes + self.shape.outside()
     }
 
-    /// Number of parameters of a record, shared ones included.
+    /// Number of parameters of a record, including shared ones.
     pub fn columns(&self) -> usize {
         self.own() + self.shared()
     }
 
-    /// Legendre polynomials at a place in the band.
+    /// Legendre polynomials at a frequency in the band.
     fn smooth(&self, omega: f64) -> [f64; DEGREE + 1] {
         let (low, high) = self.band_rad_per_s;
         let x = (2.0 * omega - low - high) / (high - low);
@@ -156,7 +156,7 @@ impl<'a> Parameters<'a> {
             (out[from + a], out[from + b]) = (front * even, front * odd);
             driven += out[from + a] * linear[a] + out[from + b] * linear[b];
             transient += even * own[a] + odd * own[b];
-            // Both the response and the transient move with the pole: dp = (−dσ + j dω)/scale.
+            // Both the response and the transient depend on the pole: dp = (−dσ + j dω)/scale.
             let residue = |v: &[f64]| Complex64::new(v[a], v[b]);
             let (r, t) = (residue(linear), residue(own));
             let of_near = (front * r + t) * (near * near) / scale;
@@ -181,7 +181,7 @@ impl<'a> Parameters<'a> {
 }
 
 impl Solved {
-    /// The parameters after a part of the step.
+    /// The parameters after a fraction of the step.
     pub fn moved(
         &self,
         layout: &Parameters,
@@ -242,7 +242,7 @@ mod tests {
         }
     }
 
-    /// Every derivative against a difference of the residual.
+    /// Every derivative against a finite difference of the residual.
     #[test]
     fn derivatives_are_those_of_the_equation() {
         let spectra = Spectra {
@@ -275,7 +275,7 @@ mod tests {
         }
     }
 
-    /// The numbers after a step of one of them.
+    /// The parameters after a step of one of them.
     fn stepped(layout: &Parameters, state: &ParameterValues, i: usize, by: f64) -> ParameterValues {
         let (own, shared) = (layout.own(), layout.shared());
         let mut solved = Solved {

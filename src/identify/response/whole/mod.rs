@@ -1,24 +1,24 @@
-//! The final fit of noise-driven records, with leakage as part of the model.
+//! Final fit of noise-driven records, with leakage as part of the model.
 //!
 //! ```text
 //! Y(k) = H(jω_k) U(k) + T(k) + E(k),   T(k) = Σ r/(jω_k − p) + r*/(jω_k − p*) + Σ_l t_l P_l(x_k)
 //! ```
 //!
 //! Y, U: discrete Fourier transforms of a whole record without a window; H: the response, with modes at p; T: transient
-//! of both ends of the record, a sum of the same modes with other residues r and a smooth part in Legendre polynomials P_l
-//! of the place x_k in the band, for modes outside it and the motion between samples; E: noise of the measured signal,
-//! independent from line to line, with a slowly varying variance. The equation is exact for any excitation, so no
-//! resonance is widened, however short the record. (R. Pintelon, J. Schoukens, G. Vandersteen, Frequency domain system
-//! identification using arbitrary signals, IEEE Trans. Automatic Control 42 (1997), 1717; Pintelon & Schoukens, System
-//! Identification, 2nd ed., 2012, 6.3.2 and 9.)
+//! of both ends of the record, a sum of the same modes with other residues r and a smooth part in Legendre polynomials
+//! P_l of the position x_k in the band, for modes outside it and the motion between samples; E: noise of the measured
+//! signal, independent from line to line, with a slowly varying variance. The equation is exact for any excitation, so
+//! no resonance is broadened, however short the record. (R. Pintelon, J. Schoukens, G. Vandersteen, Frequency domain
+//! system identification using arbitrary signals, IEEE Trans. Automatic Control 42 (1997), 1717; Pintelon & Schoukens,
+//! System Identification, 2nd ed., 2012, 6.3.2 and 9.)
 //!
-//! Weighted least squares (the maximum-likelihood estimate), by Gauss-Newton steps in all parameters from the fit of the
-//! averaged response. The variance of the noise is that of the residual ([`noise`]); the covariance is the inverse of the
-//! information.
+//! Weighted least squares (the maximum-likelihood estimate), by Gauss–Newton steps in all parameters, starting from the
+//! fit of the averaged response. The variance of the noise is that of the residual ([`noise`]); the covariance is the
+//! inverse of the information matrix.
 //!
-//! Noise that enters before the resonance may be in the recorded input. That makes H too small, up to the factor
-//! g = (1 + √(1 − 4ρ))/2 for ρ = r/S_u, where S_u is the mean power of the recorded input: the gain's uncertainty allows
-//! for it with the second moment of a factor anywhere between g and 1, (1 − g)²/3.
+//! Noise that enters before the resonance may be in the recorded input. That biases H low, up to the factor g = (1 +
+//! √(1 − 4ρ))/2 for ρ = r/S_u, where S_u is the mean power of the recorded input: the gain's uncertainty allows for it
+//! with the second moment of a factor uniform between g and 1, (1 − g)²/3.
 
 mod line;
 mod noise;
@@ -47,32 +47,33 @@ struct Spectra {
     weight: Vec<f64>,
 }
 
-/// Most steps, before and after the noise is estimated.
+/// Maximum number of steps, before and after the noise is estimated.
 const MOST_STEPS: usize = 12;
-/// Times a step is halved.
+/// Maximum number of halvings of a step.
 const HALVINGS: usize = 8;
-/// Largest step, over its standard uncertainty, that is the last one, before and after the noise is estimated: the error
-/// after a step is a small part of it.
+/// Convergence: largest step relative to its standard uncertainty, before and after the noise is estimated; the
+/// remaining error is a small fraction of it.
 const LAST_STEP: (f64, f64) = (1.0, 0.1);
-/// Part of the lines, on each side, over which the noise is smoothed; and the fewest and most of them.
+/// Fraction of the lines, on each side, over which the noise is smoothed; and limits of their number.
 const SMOOTHED: f64 = 0.04;
 const NEIGHBOURS: (usize, usize) = (20, 400);
-/// Fewest lines for each parameter.
+/// Minimum number of lines per parameter.
 const LEAST_LINES: usize = 2;
-/// Noise before the resonance that is significant: in standard uncertainties, and over the power of the input.
+/// Minimum significant noise before the resonance: in standard uncertainties, and relative to the power of the
+/// input.
 const BEFORE: (f64, f64) = (4.0, 1e-6);
-/// Lines for each parameter in the first search.
+/// Number of lines per parameter in the first search.
 const ENOUGH: usize = 500;
-/// Lines within half the width of a mode in the first search.
+/// Number of lines within the half-width of a mode in the first search.
 const WITHIN: f64 = 25.0;
 
-/// Whole records as they are fitted.
+/// Whole records as fitted.
 pub(super) struct Whole {
     records: Vec<Spectra>,
 }
 
 impl Whole {
-    /// The records at the lines of the averaged response; `None` unless that has Hann's window and so leakage.
+    /// The records at the lines of the averaged response; `None` unless that has a Hann window and so leakage.
     pub fn of(records: &[Driven], set: &Set, shape: &Data) -> Option<Self> {
         let spectra = |r| Spectra::of(r, shape.band_rad_per_s());
         (set.window == Window::Hann).then(|| Self {
@@ -80,8 +81,8 @@ impl Whole {
         })
     }
 
-    /// Fits them, starting from a fit of the averaged response; `None` if it does not converge or there are too few
-    /// lines.
+    /// Fits the records, starting from a fit of the averaged response; `None` if it does not converge or there are
+    /// too few lines.
     pub fn refine(&mut self, shape: &Data, start: &Modal, set: &Set) -> Option<FinalFit> {
         let all = &mut self.records;
         all.iter_mut().for_each(|spectra| spectra.weight.fill(1.0));
@@ -123,7 +124,7 @@ impl Whole {
     }
 }
 
-/// 1 − g, the largest relative error of the gain for noise of that power before the resonance, over that of the input.
+/// 1 − g, the largest relative error of the gain for noise before the resonance of this power relative to the input.
 fn largest_gain_error(before: f64) -> f64 {
     0.5 * (1.0 - (1.0 - 4.0 * before).max(0.0).sqrt())
 }
@@ -146,7 +147,7 @@ impl Spectra {
         }
     }
 
-    /// Evenly thinned lines for the first search, with enough of them within the narrowest mode.
+    /// Evenly decimated lines for the first search, with enough of them within the narrowest mode.
     fn thinned(&self, layout: &Parameters, state: &ParameterValues) -> Self {
         let rates = state.poles.iter().map(|p| p.rate_per_s);
         let narrowest = rates.fold(f64::INFINITY, f64::min) / (self.omega[1] - self.omega[0]);
@@ -170,7 +171,7 @@ impl Spectra {
         in_parts(self.omega.len(), PART, threads(), part).concat()
     }
 
-    /// Weights from the residual, which is less than the noise by what the fit absorbs; and the parts of the noise.
+    /// Weights from the residual, corrected for the noise absorbed by the fit; and the components of the noise.
     fn learn_noise(
         &mut self,
         layout: &Parameters,
@@ -197,7 +198,7 @@ impl Spectra {
         parts
     }
 
-    /// Power of the noise before the resonance over that of the applied signal; 0 if it is not significant.
+    /// Power of the noise before the resonance relative to the applied signal; 0 if not significant.
     fn before_resonance(&self, parts: &NoiseParts) -> f64 {
         let applied: f64 = self.applied.iter().map(|u| u.norm_sqr()).sum();
         let part = parts.shaped * self.applied.len() as f64 / applied;
@@ -206,7 +207,7 @@ impl Spectra {
     }
 }
 
-/// Root of the power of the residual over that of the measured signal, over all lines and records.
+/// RMS residual relative to the measured signal, over all lines and records.
 fn residual_over_measured(layout: &Parameters, all: &[Spectra], state: &ParameterValues) -> f64 {
     let (mut left, mut whole) = (0.0, 0.0);
     for (record, spectra) in all.iter().enumerate() {
@@ -216,7 +217,7 @@ fn residual_over_measured(layout: &Parameters, all: &[Spectra], state: &Paramete
     (left / whole).sqrt()
 }
 
-/// Gauss-Newton steps, the last of which is small compared with the uncertainty; `None` if they do not converge.
+/// Gauss–Newton steps until the last is small compared with the uncertainty; `None` if they do not converge.
 fn descend(
     layout: &Parameters,
     all: &[Spectra],
@@ -249,7 +250,7 @@ fn possible(pole: &Pole) -> bool {
     pole.rate_per_s > 0.0 && pole.omega_rad_per_s > 0.0
 }
 
-/// The largest number up to `count` with the prime factors 2, 3, 5 and 7 only: its transform is fast, and at most a few
+/// The largest number up to `count` with only the prime factors 2, 3, 5 and 7: its transform is fast, and at most a few
 /// per cent of the samples are lost.
 fn easily_transformed(count: usize) -> usize {
     let easy = |n: &usize| {

@@ -4,11 +4,11 @@
 //! S(k) = (w + r |H(jω_k)|²) · g(k)
 //! ```
 //!
-//! w: noise of the measured signal; r: noise that enters before the resonance, as from something else that drives the
-//! stand, or in the recorded input; both by maximum likelihood, |E(k)|² being exponentially distributed about S(k); g: the
-//! mean of |E|²/(w + r|H|²) over neighbouring lines. (P. Whittle, J. R. Stat. Soc. B 15 (1953), 125.)
+//! w: noise of the measured signal; r: noise that enters before the resonance, such as another excitation of the stand,
+//! or noise in the recorded input; both by maximum likelihood, |E(k)|² being exponentially distributed about S(k); g:
+//! the mean of |E|²/(w + r|H|²) over neighbouring lines. (P. Whittle, J. R. Stat. Soc. B 15 (1953), 125.)
 
-/// Parts of the noise.
+/// Components of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct NoiseParts {
     /// w.
@@ -19,15 +19,15 @@ pub(super) struct NoiseParts {
     pub shaped_std: f64,
 }
 
-/// Steps of the search.
+/// Number of steps of the search.
 const STEPS: usize = 50;
-/// Smallest part of the mean power that is white.
+/// Minimum white fraction of the mean power.
 const LEAST_WHITE: f64 = 1e-9;
 
 impl NoiseParts {
-    /// The parts of these powers, where `shape` is |H|² at each line.
+    /// The components of these powers, where `shape` is |H|² at each line.
     ///
-    /// Fisher's scoring: regression on 1 and |H|² with the weights 1/S².
+    /// Fisher scoring: regression on 1 and |H|² with the weights 1/S².
     pub fn of(power: &[f64], shape: &[f64]) -> Self {
         let count = power.len() as f64;
         let mean = power.iter().sum::<f64>() / count;
@@ -48,7 +48,7 @@ impl NoiseParts {
             }
             let white = ((c * d - b * e) / determinant).max(LEAST_WHITE * mean);
             let shaped = ((a * e - b * d) / determinant).max(0.0);
-            // Half steps do not swing.
+            // Half steps avoid oscillation.
             parts.white = 0.5 * (parts.white + white);
             parts.shaped = 0.5 * (parts.shaped + shaped);
             parts.shaped_std = (a / determinant).sqrt();

@@ -10,19 +10,19 @@ use super::line::{ParameterValues, Parameters};
 use crate::identify::response::inverse::invert;
 use crate::parallel::{in_parts, threads};
 
-/// Lines that are multiplied at once.
+/// Number of lines multiplied at once.
 const AT_ONCE: usize = 256;
-/// Lines of one job; the parts are added in their order, so the result does not depend on the threads.
+/// Lines per job; the parts are added in order, so the result does not depend on the threads.
 pub(super) const PART: usize = 64 * AT_ONCE;
 
-/// A slice of numbers as a matrix with any strides.
+/// A slice of numbers as a matrix with arbitrary strides.
 type View<'a> = DMatrixView<'a, f64, Dyn, Dyn>;
 
 /// Products of the columns of a record; the residual is the last column.
 pub(super) struct Gram(DMatrix<f64>);
 
 impl Gram {
-    /// Those of all records.
+    /// Gram matrices of all records.
     pub fn all(layout: &Parameters, all: &[Spectra], state: &ParameterValues) -> Vec<Self> {
         let one = |(record, spectra)| Self::of(layout, spectra, state, record);
         all.iter().enumerate().map(one).collect()
@@ -88,8 +88,8 @@ pub(super) struct Solved {
     pub covariance: DMatrix<f64>,
 }
 
-/// Regularisation of a transient's equations with a diagonal scaled to 1: the transient of a broad mode is nearly the same
-/// as the smooth part, and their distinction does not matter.
+/// Regularisation of a transient's equations with a diagonal scaled to 1: the transient of a broad mode is nearly the
+/// same as the smooth part, and separating them is unnecessary.
 const REGULARISATION: f64 = 1e-12;
 
 impl Solved {
@@ -117,7 +117,8 @@ impl Solved {
         })
     }
 
-    /// The largest step of a pole or the delay over its standard uncertainty, for that variance of the weighted noise.
+    /// The largest step of a pole or the delay relative to its standard uncertainty, for this variance of the weighted
+    /// noise.
     pub fn largest_step(&self, layout: &Parameters, variance: f64) -> f64 {
         let one = |i: usize| self.step[i].abs() / (variance * self.covariance[(i, i)]).sqrt();
         (0..layout.searched()).map(one).fold(0.0, f64::max)

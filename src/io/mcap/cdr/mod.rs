@@ -13,12 +13,12 @@ use super::schema::{FieldKind, Schema};
 use plan::{CdrPlan, Rules};
 use walk::CdrWalk;
 
-/// Bytes of the encapsulation in front of a message.
+/// Size of the encapsulation header of a message.
 const ENCAPSULATION: usize = 4;
-/// Most padding behind a message.
+/// Maximum padding after a message.
 const TAIL: usize = 3;
 
-/// Takes wanted numbers out of messages of one type.
+/// Extracts wanted numbers from messages of one type.
 pub struct CdrDecoder {
     schema: Arc<Schema>,
     targets: Targets,
@@ -28,7 +28,7 @@ pub struct CdrDecoder {
     layouts: [Option<CdrLayout>; 2],
 }
 
-/// Plans for the ways in which messages of an encapsulation may be laid out.
+/// Plans for the possible layouts of messages of an encapsulation.
 struct CdrLayout {
     plans: Vec<CdrPlan>,
     chosen: usize,
@@ -57,7 +57,7 @@ impl CdrDecoder {
     /// Reads a message.
     ///
     /// # Errors
-    /// [`Damage`] if the message does not hold the value.
+    /// [`Damage`] if the message does not contain the value.
     pub fn read(&mut self, message: &[u8], reading: &mut Reading) -> Result<(), Damage> {
         let (is_big, is_second, data) = if self.is_ros1 {
             (false, false, message)
@@ -107,8 +107,8 @@ impl CdrDecoder {
             wide: 4,
             size_ahead: is_second,
         };
-        // Writers differ in the width of wide characters, and some leave out the sizes that
-        // XCDR2 wants before lists: messages tell which.
+        // Writers differ in the width of wide characters, and some omit the sizes that XCDR2
+        // requires before lists: the messages decide.
         let wides: &[u8] = if self.has_wide_text { &[4, 2] } else { &[4] };
         let ahead: &[bool] = if is_second { &[true, false] } else { &[false] };
         let mut plans: Vec<CdrPlan> = Vec::new();
@@ -162,7 +162,7 @@ impl CdrLayout {
     }
 }
 
-/// Byte order, whether it is XCDR2, and the message behind.
+/// Byte order, whether it is XCDR2, and the message after the header.
 fn encapsulation(message: &[u8]) -> Result<(bool, bool, &[u8]), Damage> {
     let Some((head, data)) = message.split_at_checked(ENCAPSULATION) else {
         return Err(Damage::Short);

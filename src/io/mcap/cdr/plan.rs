@@ -1,89 +1,89 @@
-//! A message's layout turned into the fewest steps that lead to the wanted numbers.
+//! Compilation of a message's layout into the fewest steps to the wanted numbers.
 
 use super::size::PaddedSize;
 use crate::io::mcap::decode::Targets;
 use crate::io::mcap::route::Hop;
 use crate::io::mcap::schema::{FieldKind, Number, Schema};
 
-/// How data are laid out.
+/// Rules of data layout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rules {
     /// Largest padding: 8 in CDR, 4 in XCDR2, 1 in ROS 1.
     pub largest_align: u8,
-    /// Bytes of a type without fields: 1 in ROS 2, 0 in ROS 1.
+    /// Size of a type without fields: 1 in ROS 2, 0 in ROS 1.
     pub empty: u8,
-    /// Bytes of a wide character.
+    /// Size of a wide character.
     pub wide: u8,
-    /// Whether lists of anything but numbers begin with their size in bytes, as XCDR2 has it.
+    /// Whether lists of anything but numbers begin with their size in bytes, as in XCDR2.
     pub size_ahead: bool,
 }
 
-/// Where a number goes, as a set of bits.
+/// Destinations of a number, as a bit set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sinks(u8);
 
 impl Sinks {
-    /// To the values.
+    /// The values.
     pub const VALUE: Self = Self(1);
-    /// To the seconds of the stamp.
+    /// Seconds of the stamp.
     pub const SECONDS: Self = Self(2);
-    /// To its nanoseconds.
+    /// Nanoseconds of the stamp.
     pub const NANOSECONDS: Self = Self(4);
-    /// To the spacing of samples.
+    /// The spacing of samples.
     pub const SPACING: Self = Self(8);
-    /// To the names that are searched.
+    /// The names that are searched.
     pub const NAME: Self = Self(16);
 
-    /// Whether one of the others is among these.
+    /// Whether any of the others is included.
     pub fn has(self, other: Self) -> bool {
         self.0 & other.0 != 0
     }
 }
 
-/// Something that is passed over.
+/// An item to be skipped.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Item {
-    /// Of a size that follows from where it begins.
+    /// Of a size that follows from its start.
     Fixed(PaddedSize),
     /// Text.
     Text,
     /// Text of wide characters.
     WideText,
-    /// A type whose size varies, by its place.
+    /// A type of variable size, by its index.
     Struct(usize),
     /// A list.
     List(Box<List>),
 }
 
-/// A list, or an array of items whose size varies.
+/// A list, or an array of items of variable size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct List {
     /// Number of items if it is not in the message.
     pub count: Option<u32>,
     /// Its items.
     pub item: Item,
-    /// Length of each item but the first, if all have the same.
+    /// Length of each item except the first, if constant.
     pub stride: Option<u64>,
-    /// Whether its size in bytes stands before it.
+    /// Whether its size in bytes precedes it.
     pub size_ahead: bool,
 }
 
 /// One step through a message.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Step {
-    /// Over something.
+    /// Skips an item.
     Skip(Item),
-    /// Takes a number.
+    /// Reads a number.
     Read(Number, Sinks),
-    /// Compares a text with the name that is looked for.
+    /// Compares a text with the wanted name.
     Name,
-    /// Into an item of a list.
+    /// Enters an item of a list.
     Pick(Box<Pick>),
-    /// Through all numbers of a list.
+    /// Reads all numbers of a list.
     Numbers(Box<List>, Number),
 }
 
-/// Which items of a list.
+/// Selection of list items.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pick {
     /// The list.
@@ -92,27 +92,27 @@ pub struct Pick {
     pub which: Hop,
     /// Steps in the item.
     pub inside: Vec<Step>,
-    /// Whether something behind the list is wanted too.
+    /// Whether something after the list is wanted, too.
     pub resume: bool,
 }
 
 /// Steps to the wanted numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CdrPlan {
-    /// How data are laid out.
+    /// Rules of data layout.
     pub rules: Rules,
     /// The steps.
     pub steps: Vec<Step>,
     /// Steps that find the named item.
     pub lookup: Vec<Step>,
-    /// Steps over each type whose size varies.
+    /// Steps over each type of variable size.
     pub structs: Vec<Vec<Step>>,
     /// The whole message.
     pub whole: Item,
 }
 
 impl CdrPlan {
-    /// Plans the way through messages of a type that does not contain itself.
+    /// Plans the steps through messages of a non-recursive type.
     pub fn new(schema: &Schema, targets: &Targets, rules: Rules) -> Self {
         let mut planner = Planner {
             schema,
@@ -150,7 +150,7 @@ type CdrTarget<'a> = (&'a [Hop], Sinks);
 struct Planner<'a> {
     schema: &'a Schema,
     rules: Rules,
-    /// How each type is passed over, once it is known.
+    /// How to skip each type, once known.
     items: Vec<Option<Item>>,
     structs: Vec<Vec<Step>>,
 }
@@ -170,7 +170,7 @@ impl Planner<'_> {
             FieldKind::Many(many) => {
                 let list = self.list(&many.item, many.count);
                 match (&list.item, list.count) {
-                    // An array of nothing takes no bytes, whatever its items would take.
+                    // An empty array takes no bytes, whatever its items.
                     (_, Some(0)) if !list.size_ahead => Item::Fixed(PaddedSize::NONE),
                     (Item::Fixed(run), Some(count)) => {
                         let items = run.repeat(count);
@@ -226,7 +226,7 @@ impl Planner<'_> {
         item
     }
 
-    /// Steps to what is wanted in data of a kind, and to their end if something follows.
+    /// Steps to the wanted parts of data of a kind, and to their end if something follows.
     fn steps(&mut self, kind: &FieldKind, wanted: &[CdrTarget], to_end: bool) -> Vec<Step> {
         match kind {
             FieldKind::Struct(index) => self.fields(*index, wanted, to_end),
@@ -277,7 +277,7 @@ impl Planner<'_> {
     }
 
     fn pick(&mut self, list: List, item: &FieldKind, wanted: &[CdrTarget], resume: bool) -> Step {
-        // Only the value or the names lie in lists, so all that is wanted takes the same hop.
+        // Only the value or the names are in lists, so all wanted parts share the same hop.
         let which = wanted.first().and_then(|(hops, _)| hops.first());
         let which = which.copied().unwrap_or(Hop::All);
         if let (Hop::All, FieldKind::Number(number)) = (which, item) {
@@ -296,7 +296,7 @@ impl Planner<'_> {
     }
 }
 
-/// Adds a skip, joined to the one before if both are of fixed size.
+/// Adds a skip, merged with the previous one if both are of fixed size.
 fn push_skip(steps: &mut Vec<Step>, item: Item) {
     if let (Some(Step::Skip(Item::Fixed(last))), Item::Fixed(next)) = (steps.last_mut(), &item) {
         *last = last.then(next);

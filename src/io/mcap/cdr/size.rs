@@ -1,17 +1,17 @@
-//! How far data of fixed size reach, wherever they begin.
+//! Sizes of data of fixed size, depending on their start.
 
-/// Bytes from the start to the end of data of fixed size, for each start modulo 8.
+/// Number of bytes from start to end of data of fixed size, for each start modulo 8.
 ///
-/// Data are padded to multiples of their own size, so what follows a field depends on where it
-/// began, but only modulo the largest padding, which is 8.
+/// Data are aligned to multiples of their own size, so the layout after a field depends on its
+/// start, but only modulo the largest alignment, which is 8.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PaddedSize([u64; 8]);
 
 impl PaddedSize {
-    /// Nothing.
+    /// Empty.
     pub const NONE: Self = Self([0; 8]);
 
-    /// A number of `size` bytes that begins at a multiple of `align`, a power of two up to 8.
+    /// A number of `size` bytes aligned to `align`, a power of two up to 8.
     pub fn of(size: u8, align: u8) -> Self {
         let align = u64::from(align.clamp(1, 8));
         let size = u64::from(size);
@@ -21,12 +21,12 @@ impl PaddedSize {
         }))
     }
 
-    /// Bytes from a start.
+    /// Size from a start.
     pub fn length_from(&self, start: usize) -> usize {
         usize::try_from(self.0[start & 7]).unwrap_or(usize::MAX)
     }
 
-    /// This, and then that.
+    /// Concatenation.
     pub fn then(&self, next: &Self) -> Self {
         Self(std::array::from_fn(|start| {
             let length = self.0[start];
@@ -35,7 +35,7 @@ impl PaddedSize {
         }))
     }
 
-    /// This so many times.
+    /// Repetition.
     pub fn repeat(&self, count: u32) -> Self {
         let (mut power, mut result, mut left) = (*self, Self::NONE, count);
         while left > 0 {
@@ -48,7 +48,7 @@ impl PaddedSize {
         result
     }
 
-    /// The length that all repetitions but the first have, if they have the same.
+    /// Length of all repetitions except the first, if constant.
     pub fn stride(&self) -> Option<u64> {
         let mut strides = (0..8_usize).flat_map(|start| {
             let mut at = start as u64 + self.0[start];

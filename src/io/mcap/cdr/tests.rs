@@ -25,7 +25,7 @@ fn read(schema: &Arc<Schema>, field: &str, message: &[u8]) -> Result<Vec<f64>, D
     Ok(reading.values)
 }
 
-/// Writes CDR by the book, one value at a time, to compare with.
+/// A straightforward CDR writer for comparison, one value at a time.
 struct Book {
     bytes: Vec<u8>,
     is_big: bool,
@@ -105,7 +105,7 @@ fn a_joint_state_in_both_byte_orders_and_both_versions() {
             .unwrap();
         assert_eq!(reading.stamp_ns(), Some(7_000_000_005));
     }
-    // Without the sizes before lists of texts, as some writers of XCDR2 have it.
+    // Without the sizes before lists of texts, as with some writers of XCDR2.
     for kind in [0x06, 0x07, 0x10, 0x11] {
         let message = joints(kind, 4, &[0.1, -0.2]);
         assert_eq!(
@@ -120,7 +120,7 @@ fn a_joint_state_in_both_byte_orders_and_both_versions() {
 fn xcdr2_with_the_size_before_a_list_of_texts() {
     let schema = schema("string[] name\nfloat64[] effort", Generation::Ros2);
     let mut book = Book::new(0x07, 4);
-    // The size is what follows it: a count and two texts with padding.
+    // The size covers what follows it: a count and two texts with padding.
     book.count(4 + 4 + 2 + 2 + 4 + 3)
         .count(2)
         .text("a")

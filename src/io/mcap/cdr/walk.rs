@@ -1,4 +1,4 @@
-//! Following the steps of a plan through the bytes of a message.
+//! Execution of the steps of a plan on the bytes of a message.
 
 use super::plan::{CdrPlan, Item, List, Pick, Sinks, Step};
 use crate::io::mcap::decode::{Damage, Names, Reading};
@@ -6,7 +6,7 @@ use crate::io::mcap::route::Hop;
 use crate::io::mcap::schema::Number;
 use crate::io::mcap::tree::item_place;
 
-/// The bytes of a number and where they start, behind padding from `at` on. An option, since an error that may own a text
+/// The bytes of a number and their start, after padding from `at` on. An option, since an error that may own a text
 /// would have to be dropped at every number.
 #[inline(always)]
 fn number_at<const N: usize>(data: &[u8], at: usize, align: usize) -> Option<(usize, [u8; N])> {
@@ -15,24 +15,24 @@ fn number_at<const N: usize>(data: &[u8], at: usize, align: usize) -> Option<(us
     Some((start, *bytes))
 }
 
-/// A place in a message.
+/// A position in a message.
 pub struct CdrWalk<'a> {
-    /// The message behind its encapsulation; padding counts from its start.
+    /// The message after its encapsulation header; alignment is relative to its start.
     pub data: &'a [u8],
-    /// The place.
+    /// The position.
     pub at: usize,
-    /// Whether numbers have their large end first.
+    /// Whether numbers are big-endian.
     pub is_big: bool,
     /// The plan.
     pub plan: &'a CdrPlan,
-    /// What is filled.
+    /// The result.
     pub reading: &'a mut Reading,
-    /// The name that is looked for.
+    /// The wanted name.
     pub names: Names<'a>,
 }
 
 impl<'a> CdrWalk<'a> {
-    /// Follows steps.
+    /// Executes steps.
     pub fn follow(&mut self, steps: &'a [Step]) -> Result<(), Damage> {
         for step in steps {
             match step {
@@ -46,7 +46,7 @@ impl<'a> CdrWalk<'a> {
         Ok(())
     }
 
-    /// Goes over something.
+    /// Skips an item.
     pub fn skip(&mut self, item: &'a Item) -> Result<(), Damage> {
         match item {
             Item::Fixed(run) => self.forward(run.length_from(self.at)),
@@ -84,7 +84,7 @@ impl<'a> CdrWalk<'a> {
         self.skip_items(list, count)
     }
 
-    /// Number of items of a list, at whose front this is.
+    /// Number of items of the list that starts here.
     fn length(&mut self, list: &List) -> Result<usize, Damage> {
         match list.count {
             Some(count) => Ok(count as usize),
@@ -106,7 +106,7 @@ impl<'a> CdrWalk<'a> {
             }
             (Item::Text, _) => self.skip_texts(count)?,
             (item, _) => {
-                // Each of them has a length of its own, so bytes run out before the count does.
+                // Each of them has its own length, so bytes run out before the count does.
                 for _ in 0..count {
                     self.skip(item)?;
                 }
@@ -115,7 +115,7 @@ impl<'a> CdrWalk<'a> {
         Ok(())
     }
 
-    /// Goes over texts one behind the other.
+    /// Skips consecutive texts.
     fn skip_texts(&mut self, count: usize) -> Result<(), Damage> {
         let (data, is_big) = (self.data, self.is_big);
         let align = 4.min(usize::from(self.plan.rules.largest_align));
@@ -186,7 +186,7 @@ impl<'a> CdrWalk<'a> {
         let Some(text) = end.and_then(|end| self.data.get(self.at..end)) else {
             return Err(Damage::Short);
         };
-        // CDR writes the zero at the end of a text, ROS 1 does not.
+        // CDR includes the terminating zero of a text, ROS 1 does not.
         let text = text.strip_suffix(&[0]).unwrap_or(text);
         self.names.compare(text);
         self.at += length;
@@ -203,7 +203,7 @@ impl<'a> CdrWalk<'a> {
         } as usize)
     }
 
-    /// The bytes of a number, behind its padding.
+    /// The bytes of a number, after its padding.
     #[inline]
     fn take<const N: usize>(&mut self) -> Result<[u8; N], Damage> {
         let align = N.min(usize::from(self.plan.rules.largest_align));
@@ -225,7 +225,7 @@ impl<'a> CdrWalk<'a> {
                 }
             }};
         }
-        // Stamps are whole numbers; what they are as f64 does not matter, and the other way round.
+        // Stamps are integers, and their value as f64 does not matter; other numbers vice versa.
         let (value, whole) = match number {
             Number::Bool => {
                 let whole = i64::from(take!(u8) != 0);

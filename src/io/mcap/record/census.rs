@@ -1,5 +1,4 @@
-//! What passes while a file is read, compared with what the file says of itself: its statistics, the index of its chunks,
-//! and the channels that it declares.
+//! Comparison of the records read with the file's own statistics, index of chunks, and declared channels.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,25 +7,25 @@ use mcap::records::{Record, op};
 use super::file::{Loss, Losses};
 use super::{parse, read_chunk_index};
 
-/// Counts of what passed, and what the file says of it.
+/// Counts of the records read, and the file's own claims.
 #[derive(Debug, Default)]
 pub(crate) struct Census {
     declared: BTreeSet<u16>,
-    /// Messages by their channel.
+    /// Number of messages by channel.
     messages: BTreeMap<u16, u64>,
-    /// Those whose channel was not declared before them.
+    /// Number of those whose channel was not declared before them.
     undeclared: u64,
     attachments: u64,
-    /// Bytes at which chunks begin.
+    /// Offsets of chunks.
     chunks: BTreeSet<u64>,
-    /// Chunks, as the index at the end of the file gives them.
+    /// Offsets of chunks from the index at the end of the file.
     indexed: BTreeSet<u64>,
     statistics: Option<Statistics>,
-    /// Whether what came last may have an index of its messages behind it.
+    /// Whether the last record may be followed by its message index.
     is_behind_chunk: bool,
 }
 
-/// What the file says of itself.
+/// The file's own statistics.
 #[derive(Debug)]
 struct Statistics {
     messages: u64,
@@ -36,7 +35,7 @@ struct Statistics {
 }
 
 impl Census {
-    /// Notes a record of the file, or, behind `chunk`, one within it.
+    /// Records a record of the file, or within a chunk if `chunk` is set.
     pub fn note(&mut self, op: u8, body: &[u8], at: u64, losses: &mut Losses) {
         match op {
             op::MESSAGE => self.message(body),
@@ -68,7 +67,7 @@ impl Census {
         }
     }
 
-    /// Notes a record of the file that is none of a chunk.
+    /// Records a top-level record of the file.
     pub fn note_outer(&mut self, op: u8, at: u64) {
         if op == op::CHUNK {
             self.chunks.insert(at);
@@ -77,7 +76,7 @@ impl Census {
     }
 
     fn message(&mut self, body: &[u8]) {
-        // A record that is cut short is counted by who reads it.
+        // The caller counts truncated records.
         let Some(id) = body.first_chunk().map(|id| u16::from_le_bytes(*id)) else {
             return;
         };
@@ -85,7 +84,7 @@ impl Census {
         self.undeclared += u64::from(!self.declared.contains(&id));
     }
 
-    /// Compares all that passed with what the file says, once it was read to its end.
+    /// Compares the counts with the file's claims, once it was read to its end.
     pub fn finish(&mut self, losses: &mut Losses) {
         if self.undeclared > 0 {
             let messages = self.undeclared;
@@ -107,7 +106,7 @@ impl Census {
         compare("messages", statistics.messages, found);
         compare("chunks", statistics.chunks, self.chunks.len() as u64);
         compare("attachments", statistics.attachments, self.attachments);
-        // Some recorders leave the counts of channels out.
+        // Some recorders omit the counts of channels.
         if found == statistics.messages && !statistics.channels.is_empty() {
             let told = |id: &u16| statistics.channels.get(id).copied().unwrap_or(0);
             let differs = self.messages.iter().find(|(id, count)| told(id) != **count);

@@ -1,6 +1,7 @@
-//! A chunk: records put together, mostly compressed.
+//! Chunks: grouped records, usually compressed.
 //!
-//! The bytes are unpacked into a buffer that grows with what really comes out; of a long chunk, piece by piece.
+//! The bytes are decompressed into a buffer that grows with the actual output; a long chunk is read piece by
+//! piece.
 
 use std::fmt;
 use std::io::{self, BufRead, Read, Write};
@@ -10,17 +11,17 @@ use mcap::records::ChunkHeader;
 
 use super::fields::RecordFields;
 
-/// Most bytes a chunk may unpack to.
+/// Maximum decompressed size of a chunk.
 pub(crate) const LARGEST: u64 = 1 << 30;
 
-/// Unpacked bytes from which a chunk is read piece by piece.
+/// Decompressed size above which a chunk is read piece by piece.
 const LONG: u64 = 1 << 25;
 
-/// Bytes that the buffer grows by while unpacking.
+/// Growth of the buffer during decompression, in bytes.
 pub(super) const STEP: usize = 1 << 18;
 
-/// Reads the front of a chunk record; what follows are its records as they are in the file.
-/// `mcap::parse_record` refuses a chunk that is cut off, front and all.
+/// Parses the header of a chunk record; the remainder are its records as stored in the file.
+/// `mcap::parse_record` rejects a truncated chunk entirely.
 pub(crate) fn chunk_front(body: &[u8]) -> Option<(ChunkHeader, &[u8])> {
     let mut fields = RecordFields { rest: body };
     let header = ChunkHeader {
@@ -34,29 +35,29 @@ pub(crate) fn chunk_front(body: &[u8]) -> Option<(ChunkHeader, &[u8])> {
     Some((header, fields.rest))
 }
 
-/// What is wrong with a chunk.
+/// A fault of a chunk.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum ChunkError {
-    /// The front cannot be read.
+    /// Unreadable header.
     Head,
-    /// A compression that is not known.
+    /// Unknown compression.
     Compression(String),
-    /// It unpacks to more than [`LARGEST`], or says so.
+    /// Decompressed size above [`LARGEST`], actual or claimed.
     TooLarge(u64),
-    /// The compressed bytes are damaged.
+    /// Damaged compressed data.
     Damaged(String),
-    /// It unpacks to another length than it says.
+    /// Decompressed length differs from the claimed one.
     Length {
-        /// What it says.
+        /// Claimed length.
         told: u64,
-        /// What came out.
+        /// Actual length.
         found: u64,
     },
-    /// The checksum does not fit.
+    /// Checksum mismatch.
     Crc {
-        /// What it says.
+        /// Stored checksum.
         told: u32,
-        /// What it is.
+        /// Computed checksum.
         found: u32,
     },
 }
@@ -84,17 +85,17 @@ impl fmt::Display for ChunkError {
     }
 }
 
-/// Where the records of a chunk are after unpacking.
+/// Location of a chunk's records after decompression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Unpacked {
     /// In the buffer.
     Buffer,
-    /// In the file as they are: that many bytes after the front.
+    /// In the file as stored: this many bytes after the header.
     InPlace(usize),
 }
 
 impl Unpacked {
-    /// The records, out of what follows the front or the buffer.
+    /// The records, from the remainder or the buffer.
     pub fn records<'a>(self, rest: &'a [u8], buffer: &'a [u8]) -> &'a [u8] {
         match self {
             Self::Buffer => buffer,
@@ -103,11 +104,11 @@ impl Unpacked {
     }
 }
 
-/// Unpacks a whole chunk after its front was read, into `records` if it is compressed, and checks its
+/// Decompresses a whole chunk after its header, into `records` if it is compressed, and checks its
 /// length and its CRC.
 ///
 /// # Errors
-/// [`ChunkError`] if any of them is wrong; `records` is then to be ignored.
+/// [`ChunkError`] if any of them is wrong; `records` must then be ignored.
 pub(crate) fn unpack(
     front: Option<&(ChunkHeader, &[u8])>,
     records: &mut Vec<u8>,
@@ -125,7 +126,7 @@ pub(crate) fn unpack(
     Ok(Unpacked::Buffer)
 }
 
-/// The front of a chunk and its bytes as they are in the file.
+/// The header of a chunk and its bytes as stored in the file.
 fn packed<'a>(
     front: Option<&'a (ChunkHeader, &'a [u8])>,
 ) -> Result<(&'a ChunkHeader, &'a [u8]), ChunkError> {
@@ -140,15 +141,15 @@ fn packed<'a>(
     }
 }
 
-/// Whether a chunk unpacks to so much that its records are to be read by [`records_of_long`].
+/// Whether a chunk's decompressed size requires [`records_of_long`].
 pub(crate) fn is_long(header: &ChunkHeader) -> bool {
     !header.compression.is_empty() && (LONG + 1..=LARGEST).contains(&header.uncompressed_size)
 }
 
-/// The records of a long chunk, which are unpacked as they are read. Of a whole chunk, length and CRC are checked first.
+/// The records of a long chunk, decompressed on the fly. Length and CRC of a complete chunk are checked first.
 ///
 /// # Errors
-/// As [`unpack`].
+/// As for [`unpack`].
 pub(crate) fn records_of_long(
     front: Option<&(ChunkHeader, &[u8])>,
     is_whole: bool,
@@ -180,7 +181,7 @@ fn check(header: &ChunkHeader, records: &[u8]) -> Result<(), ChunkError> {
     compare(header, records.len() as u64, || crc32fast::hash(records))
 }
 
-/// Compares what came out with what the front says.
+/// Compares the output with the header's claims.
 fn compare(header: &ChunkHeader, found: u64, crc: impl FnOnce() -> u32) -> Result<(), ChunkError> {
     let told = header.uncompressed_size;
     if found != told {
@@ -193,10 +194,10 @@ fn compare(header: &ChunkHeader, found: u64, crc: impl FnOnce() -> u32) -> Resul
     Ok(())
 }
 
-/// Unpacks as much as there is, also of a chunk that is cut off.
+/// Decompresses as much as there is, also of a truncated chunk.
 ///
 /// # Errors
-/// [`ChunkError`] if the rest cannot be unpacked; `records` holds what came before.
+/// [`ChunkError`] if the rest cannot be decompressed; `records` contains the output up to there.
 pub(crate) fn unpack_part(
     head: &ChunkHeader,
     packed: &[u8],
@@ -211,7 +212,7 @@ pub(crate) fn unpack_part(
     drain(decoder(&head.compression, packed)?, limit, records)
 }
 
-/// What unpacks bytes.
+/// A decompressor.
 fn decoder<'a>(
     compression: &str,
     packed: impl BufRead + Send + 'a,
@@ -226,13 +227,14 @@ fn decoder<'a>(
     }
 }
 
-/// Reads to the end, but no further than one byte past the limit.
+/// Reads to the end, but at most one byte beyond the limit.
 fn drain(mut input: impl Read, limit: u64, records: &mut Vec<u8>) -> Result<(), ChunkError> {
     let limit = usize::try_from(limit).unwrap_or(usize::MAX);
     let mut filled = 0;
     loop {
         if filled == records.len() {
-            // Doubling keeps the work proportional; the claim is only an upper bound.
+            // Doubling keeps the work proportional to the data; the claimed size is only an upper
+            // bound.
             let more = (records.len() + STEP).max(2 * records.len()).min(limit);
             records.resize(more.max(filled + 1), 0);
         }
@@ -252,12 +254,12 @@ fn drain(mut input: impl Read, limit: u64, records: &mut Vec<u8>) -> Result<(), 
     Ok(())
 }
 
-/// Compresses records: as `zstd`, `lz4` or not at all.
+/// Compresses records with `zstd`, `lz4` or not at all.
 pub(crate) fn pack(compression: &str, records: &[u8]) -> io::Result<Vec<u8>> {
     match compression {
         "zstd" => zstd::stream::encode_all(records, zstd::DEFAULT_COMPRESSION_LEVEL),
         "lz4" => {
-            // Of a chunk that is cut off, whole blocks can be unpacked: they are small.
+            // Whole blocks of a truncated chunk can be decompressed, as they are small.
             let frame = FrameInfo::new()
                 .block_size(BlockSize::Max64KB)
                 .block_mode(BlockMode::Linked)

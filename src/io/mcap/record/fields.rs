@@ -1,7 +1,6 @@
-//! Fields of a record where `mcap` cannot read them: of records that are cut off, and of texts that are
-//! not UTF-8.
+//! Record fields that `mcap` cannot read: of truncated records, and texts that are not UTF-8.
 
-/// A record's body, read from front to back. Every length is checked against what is there.
+/// A sequential reader of a record's body. Every length is checked against the available bytes.
 #[derive(Clone, Copy)]
 pub(super) struct RecordFields<'a> {
     pub rest: &'a [u8],
@@ -32,13 +31,13 @@ impl<'a> RecordFields<'a> {
         self.array().map(u64::from_le_bytes)
     }
 
-    /// Bytes after a length of 32 bits.
+    /// Bytes after a 32-bit length.
     pub fn bytes(&mut self) -> Option<&'a [u8]> {
         let length = self.u32()?;
         self.take(usize::try_from(length).ok()?)
     }
 
-    /// Text after a length; what is not UTF-8 is replaced.
+    /// Text after a length; invalid UTF-8 is replaced.
     pub fn text(&mut self) -> Option<String> {
         let bytes = self.bytes()?;
         Some(String::from_utf8_lossy(bytes).into_owned())

@@ -1,4 +1,4 @@
-//! The records of a file one after the other, chunks as they are.
+//! Sequential top-level records of a file, with chunks as stored.
 
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -12,28 +12,28 @@ use super::{RECORD_HEAD, record_head};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
 
-/// Longest record that is taken into memory; attachments may be longer, they are passed over.
+/// Longest record read into memory; attachments may be longer, as they are skipped.
 const LONGEST: u64 = chunk::LARGEST;
 /// The same for metadata, schemas and channels, of which whole lists are kept.
 static LONGEST_METADATA: AtomicU64 = AtomicU64::new(64 << 20);
-/// Bytes of an attachment that are looked at: its names.
+/// Number of bytes of an attachment that are read, for its names.
 const ATTACHMENT_FRONT: u64 = 1 << 16;
-/// Bytes of an end record.
+/// Size of an end record.
 pub(crate) const FOOTER: usize = RECORD_HEAD + 20;
-/// Opcodes that no version of the format has given a meaning, up to those that anybody may use.
+/// First reserved opcode without meaning in any version of the format, below the private ones.
 const FIRST_RESERVED: u8 = 0x10;
 const FIRST_PRIVATE: u8 = 0x80;
-/// Losses that are kept one by one.
+/// Number of losses kept individually.
 const LOSSES_KEPT: usize = 20;
-/// Where a file ends that ends within an attachment.
+/// End of a file truncated within an attachment.
 pub(crate) const IN_ATTACHMENT: &str = "within an attachment";
 
-/// Has metadata, schemas and channels of so many bytes read, in all files from now on.
+/// Sets the limit for metadata, schemas and channels, for all files from now on.
 pub(crate) fn limit_metadata(bytes: u64) {
     LONGEST_METADATA.store(bytes.min(LONGEST), Ordering::Relaxed);
 }
 
-/// Longest record of a kind that is taken into memory.
+/// Longest record of a kind that is read into memory.
 pub(crate) fn longest(op: u8) -> u64 {
     match op {
         op::METADATA | op::SCHEMA | op::CHANNEL => LONGEST_METADATA.load(Ordering::Relaxed),
@@ -41,75 +41,75 @@ pub(crate) fn longest(op: u8) -> u64 {
     }
 }
 
-/// Data that are lost.
+/// Lost data.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Loss {
     /// The file ends before its end record.
     Truncated {
-        /// Byte after the last whole record.
+        /// Offset after the last complete record.
         at: u64,
         /// Where it ends.
         what: &'static str,
     },
-    /// A chunk is damaged and was left out.
+    /// A damaged chunk that was dropped.
     Chunk {
-        /// Byte at which it begins.
+        /// Its offset.
         at: u64,
         why: ChunkError,
-        /// Log times in it as it says, in ns.
+        /// Range of log times that it claims, in ns.
         span_ns: Option<(u64, u64)>,
     },
-    /// A record within a chunk runs past its end.
+    /// A record within a chunk that runs past its end.
     Overrun {
-        /// Byte at which the chunk begins.
+        /// Offset of the chunk.
         at: u64,
     },
-    /// A record of a kind that does not exist, or not there.
+    /// A record of a kind that does not exist, or not in this place.
     Unknown {
-        /// Byte at which it, or the chunk that it is in, begins.
+        /// Offset of the record, or of the chunk that contains it.
         at: u64,
         op: u8,
         /// Whether it is in a chunk.
         is_nested: bool,
     },
-    /// A schema, a channel or an entry of the summary that cannot be read.
+    /// An unreadable schema, channel or summary entry.
     Unreadable {
-        /// Byte at which it, or the chunk that it is in, begins.
+        /// Offset of the record, or of the chunk that contains it.
         at: u64,
         op: u8,
     },
-    /// An index of messages that follows no chunk.
+    /// A message index that does not follow a chunk.
     LoneIndex {
-        /// Byte at which it begins.
+        /// Its offset.
         at: u64,
     },
-    /// An end record that does not end the file.
+    /// An end record before the end of the file.
     EarlyEnd {
-        /// Byte at which it begins.
+        /// Its offset.
         at: u64,
     },
-    /// A checksum of a part of the file does not fit.
+    /// Checksum mismatch for a part of the file.
     Checksum { told: u32, found: u32 },
-    /// Messages of channels that were not declared before them.
+    /// Messages of channels not declared before them.
     Undeclared { messages: u64 },
-    /// Chunks that the index at the end of the file gives, but that are not there.
+    /// Chunks listed in the index at the end of the file, but missing.
     MissingChunks {
-        /// Byte at which the first of them should begin.
+        /// Expected offset of the first of them.
         at: u64,
         chunks: u64,
     },
-    /// Another count than the statistics at the end of the file give.
+    /// A count that differs from the statistics at the end of the file.
     Count {
         what: &'static str,
         told: u64,
         found: u64,
     },
-    /// A record that is too long to be one.
+    /// A record that is implausibly long.
     TooLong {
-        /// Byte at which it begins.
+        /// Its offset.
         at: u64,
         op: u8,
-        /// Its length as it says.
+        /// Its claimed length.
         length: u64,
     },
 }
@@ -170,7 +170,7 @@ impl fmt::Display for Loss {
 }
 
 impl Loss {
-    /// What is said of single records, and of what the file says of itself.
+    /// Text about single records, and about the file's own claims.
     fn describe_record(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unknown {
@@ -218,7 +218,7 @@ impl Loss {
     }
 }
 
-/// Data that were lost so far.
+/// Data lost so far.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Losses {
     /// The first ones.
@@ -235,23 +235,23 @@ impl Losses {
     }
 }
 
-/// A record of the file; its bytes are held until the next one is asked for.
+/// A record of the file; its bytes are kept until the next one is requested.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FileRecord {
     pub op: u8,
-    /// Byte in the file at which it begins.
+    /// Its offset in the file.
     pub offset: u64,
-    /// Whether all of its bytes are there. Only a chunk is given otherwise.
+    /// Whether it is complete. Only chunks are returned otherwise.
     pub is_whole: bool,
 }
 
-/// The records of a file. Damage to its content is no error, it is among the losses.
+/// Records of a file. Damage to its content is not an error, but reported in the losses.
 pub(crate) struct FileReader {
     name: String,
     input: CountedInput,
-    /// Bytes of the current record in the window.
+    /// Number of bytes of the current record in the window.
     held: usize,
-    /// Bytes of the current record after those: of attachments.
+    /// Number of bytes of the current record after those, for attachments.
     behind: u64,
     pub is_ended: bool,
     /// Whether the end record was found.
@@ -265,7 +265,7 @@ impl FileReader {
     /// Opens a file and checks that it is MCAP.
     ///
     /// # Errors
-    /// If it cannot be read, or does not begin as an MCAP file does.
+    /// If it cannot be read, or does not begin like an MCAP file.
     pub fn open(input: &Input) -> Result<Self, Failure> {
         Self::new(input.name(), CountedInput::new(input.open()?))
     }
@@ -273,7 +273,7 @@ impl FileReader {
     /// Reads from a stream.
     ///
     /// # Errors
-    /// If it does not begin as an MCAP file does.
+    /// If it does not begin like an MCAP file.
     pub fn new(name: String, input: CountedInput) -> Result<Self, Failure> {
         let mut file = Self {
             name,
@@ -301,17 +301,17 @@ impl FileReader {
         &self.name
     }
 
-    /// The current record with opcode and length, only the front of an attachment.
+    /// The current record with opcode and length; for an attachment only its header.
     pub fn bytes(&self) -> &[u8] {
         &self.input.window()[..self.held]
     }
 
-    /// The current record's body, only the front of an attachment's.
+    /// The body of the current record; for an attachment only its header.
     pub fn body(&self) -> &[u8] {
         self.bytes().get(RECORD_HEAD..).unwrap_or(&[])
     }
 
-    /// The next record, or none at the end.
+    /// The next record, or `None` at the end.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -375,16 +375,16 @@ impl FileReader {
         }))
     }
 
-    /// Whether an end record of so many bytes is the last of the file.
+    /// Whether an end record of this size is the last of the file.
     fn is_at_end(&mut self, whole: usize) -> Result<bool, Failure> {
         let end = whole + MAGIC.len();
         let there = self.want(end + 1)?;
         let behind = &self.input.window()[whole.min(there)..there];
-        // A file that is cut within its last bytes lost nothing.
+        // A file truncated within its last bytes has lost nothing.
         Ok(whole == FOOTER && MAGIC.starts_with(behind))
     }
 
-    /// Compares the CRC of all that came before the record of the data's end with the one that it gives.
+    /// Compares the CRC of everything before the data-end record with the stored one.
     fn check_data(&mut self) {
         let Some(told) = self
             .body()
@@ -394,13 +394,13 @@ impl FileReader {
             return;
         };
         let found = self.crc.clone().finalize();
-        // What is damaged may be known already.
+        // Damage may be known already.
         if told != 0 && told != found && self.losses.count == 0 {
             self.losses.add(Loss::Checksum { told, found });
         }
     }
 
-    /// Passes over the current record; false if the file ends in it.
+    /// Skips the current record; `false` if the file ends within it.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -408,7 +408,7 @@ impl FileReader {
         self.copy(|_| Ok(()))
     }
 
-    /// Gives all bytes of the current record away; false if the file ends in it.
+    /// Passes all bytes of the current record to `write`; `false` if the file ends within it.
     ///
     /// # Errors
     /// If the file cannot be read, or those of `write`.

@@ -1,23 +1,23 @@
-//! Bytes of a file or stream, as many at a time as a record needs.
+//! Buffered bytes of a file or stream, as many as a record needs.
 
 use std::io::{self, Read};
 
-/// Bytes asked for at a time: a claim of a huge record takes no more memory than the bytes
-/// that really are there.
+/// Number of bytes requested at a time: a claimed huge record takes no more memory than its actual
+/// bytes.
 const PIECE: usize = 1 << 18;
 
-/// A stream with a window of bytes that have been read and not yet used.
+/// A stream with a window of bytes that have been read but not yet consumed.
 pub(crate) struct CountedInput {
     stream: Box<dyn Read + Send>,
     buffer: Vec<u8>,
     start: usize,
     end: usize,
-    /// Place of `start` in the file.
+    /// Offset of `start` in the file.
     offset: u64,
 }
 
 impl CountedInput {
-    /// Begins at the front of a stream.
+    /// Starts at the beginning of a stream.
     pub fn new(stream: Box<dyn Read + Send>) -> Self {
         Self {
             stream,
@@ -28,13 +28,13 @@ impl CountedInput {
         }
     }
 
-    /// Place in the file of the next byte.
+    /// Offset of the next byte in the file.
     pub fn offset(&self) -> u64 {
         self.offset
     }
 
-    /// Reads until that many bytes are in the window, or the file ends; gives how many there are,
-    /// at most as many as wanted.
+    /// Reads until `count` bytes are in the window, or the file ends; returns how many there are,
+    /// at most `count`.
     ///
     /// # Errors
     /// If the stream cannot be read.
@@ -47,10 +47,10 @@ impl CountedInput {
                 self.start = 0;
             }
             if self.buffer.len() - self.end < missing {
-                // Doubling keeps the work proportional to the bytes there are.
+                // Doubling keeps the work proportional to the actual bytes.
                 self.buffer.resize((2 * self.end).max(PIECE), 0);
             }
-            // What is read beyond the wish must be moved to the front later on.
+            // Bytes read beyond the request must be moved to the front later on.
             let until = self.buffer.len().min(self.end + PIECE);
             match self.stream.read(&mut self.buffer[self.end..until])? {
                 0 => return Ok(self.end - self.start),
@@ -65,7 +65,7 @@ impl CountedInput {
         &self.buffer[self.start..self.end]
     }
 
-    /// Goes on behind that many bytes of the window.
+    /// Consumes bytes of the window.
     pub fn used(&mut self, count: usize) {
         let count = count.min(self.end - self.start);
         self.start += count;

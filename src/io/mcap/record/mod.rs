@@ -13,15 +13,15 @@ use mcap::records::{AttachmentHeader, ChunkIndex, Record, op};
 
 use fields::RecordFields;
 
-/// Reads a header, schema, channel or metadata record. Where a text in it is not UTF-8, it is read with
-/// replacement characters; of pairs with the same key, the last one counts. `mcap` refuses both, and reserves memory for
-/// any length of a text that is claimed, up to 4 GiB.
+/// Parses a header, schema, channel or metadata record. Invalid UTF-8 is read with replacement characters; for pairs
+/// with the same key, the last one counts. `mcap` rejects both, and reserves memory for any claimed text length, up to
+/// 4 GiB.
 pub(crate) fn parse(op: u8, body: &[u8]) -> Option<Record<'static>> {
     let mended = mended(op, body)?;
     mcap::parse_record(op, &mended).ok().map(Record::into_owned)
 }
 
-/// The same record in UTF-8 and without repeated keys.
+/// The same record with valid UTF-8 and unique keys.
 fn mended(op: u8, body: &[u8]) -> Option<Vec<u8>> {
     let (front, texts, has_pairs) = match op {
         op::HEADER => (0, 2, false),
@@ -53,10 +53,11 @@ fn mended(op: u8, body: &[u8]) -> Option<Vec<u8>> {
     Some(mended)
 }
 
-/// The index of a chunk, if all of it is there.
+/// The index of a chunk, if complete.
 pub(crate) fn read_chunk_index(body: &[u8]) -> Option<ChunkIndex> {
     let mut fields = RecordFields { rest: body };
-    // First and last time, place and length of the chunk; those of its indexes; compression, sizes.
+    // First and last time, offset and length of the chunk; those of its indexes; compression,
+    // sizes.
     fields.take(32)?;
     fields.bytes()?;
     fields.take(8)?;
@@ -68,23 +69,23 @@ pub(crate) fn read_chunk_index(body: &[u8]) -> Option<ChunkIndex> {
 }
 
 fn push(record: &mut Vec<u8>, bytes: &[u8]) {
-    // What was longer than a record can be has been refused before.
+    // Longer texts than a record can have were rejected before.
     let length = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
     record.extend_from_slice(&length.to_le_bytes());
     record.extend_from_slice(bytes);
 }
 
-/// Bytes in front of a message's own content.
+/// Size of a message's header.
 const MESSAGE_HEAD: usize = 2 + 4 + 8 + 8;
 
-/// One message. `mcap::parse_record` reads its head field by field through a cursor; this is what every
-/// message of a file goes through.
+/// One message. `mcap::parse_record` parses its header field by field through a cursor, but this is
+/// executed for every message of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RawMessage<'a> {
     pub channel_id: u16,
-    /// Time at which it was recorded, in ns.
+    /// Log time, in ns.
     pub log_time_ns: u64,
-    /// Time at which it was published, in ns.
+    /// Publish time, in ns.
     pub publish_time_ns: u64,
     pub data: &'a [u8],
 }
@@ -103,7 +104,7 @@ impl<'a> RawMessage<'a> {
     }
 }
 
-/// Reads the front of an attachment record: its header and the length of its content.
+/// Parses the header of an attachment record and the length of its content.
 pub(crate) fn attachment_front(body: &[u8]) -> Option<(AttachmentHeader, u64)> {
     let mut fields = RecordFields { rest: body };
     let header = AttachmentHeader {
@@ -115,7 +116,7 @@ pub(crate) fn attachment_front(body: &[u8]) -> Option<(AttachmentHeader, u64)> {
     Some((header, fields.u64()?))
 }
 
-/// Calls `each` with opcode and body of every whole record.
+/// Calls `each` with opcode and body of every complete record.
 pub(crate) fn each_record(records: &[u8], mut each: impl FnMut(u8, &[u8])) {
     let mut rest = records;
     while let Some((op, body)) = split_record(rest) {
@@ -124,10 +125,10 @@ pub(crate) fn each_record(records: &[u8], mut each: impl FnMut(u8, &[u8])) {
     }
 }
 
-/// Bytes of a record's opcode and length.
+/// Size of a record's opcode and length.
 const RECORD_HEAD: usize = 9;
 
-/// Opcode and body of the record at the front, if it is whole.
+/// Opcode and body of the first record, if complete.
 pub(super) fn split_record(records: &[u8]) -> Option<(u8, &[u8])> {
     let (op, length) = record_head(records)?;
     let body = records[RECORD_HEAD..].get(..usize::try_from(length).ok()?)?;

@@ -1,4 +1,4 @@
-//! The records of an MCAP file one after the other, those in chunks included.
+//! Sequential records of an MCAP file, including those in chunks.
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -16,28 +16,28 @@ use super::{RECORD_HEAD, record_head, split_record};
 use crate::failure::Failure;
 use crate::io::Input;
 
-/// How many chunks of a compression there are, and their bytes.
+/// Number of chunks of a compression, and their sizes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct ChunkCount {
     pub chunks: u64,
-    /// Bytes in the file.
+    /// Stored size in bytes.
     pub packed: u64,
-    /// Bytes unpacked, as the chunks say.
+    /// Claimed decompressed size in bytes.
     pub unpacked: u64,
 }
 
-/// The records of a file.
+/// Records of a file.
 pub(crate) struct RecordReader {
     file: FileReader,
-    /// Unpacked records of the current chunk, or the front of an attachment.
+    /// Decompressed records of the current chunk, or the header of an attachment.
     buffer: Vec<u8>,
-    /// Where they lie in the file's record instead, of a chunk that is not compressed.
+    /// Their location in the file's record instead, for an uncompressed chunk.
     in_place: Option<Range<usize>>,
-    /// Where more of them come from, of a long chunk.
+    /// Source of further records of a long chunk.
     more: Option<Box<dyn Read + Send>>,
-    /// How far they have been delivered.
+    /// Position up to which they have been delivered.
     at: usize,
-    /// Where the current record, or the chunk that it is in, begins in the file.
+    /// Offset in the file of the current record, or of the chunk that contains it.
     record_offset: u64,
     chunk_counts: BTreeMap<String, ChunkCount>,
     census: Census,
@@ -47,7 +47,7 @@ pub(crate) struct RecordReader {
 /// Longest record in a chunk that is read piece by piece.
 const LONGEST_NESTED: u64 = 1 << 28;
 
-/// Where the body of a record is held.
+/// Location of the body of a record.
 enum Holder {
     File,
     Records(Range<usize>),
@@ -57,7 +57,7 @@ impl RecordReader {
     /// Opens a file and checks that it is MCAP.
     ///
     /// # Errors
-    /// If it cannot be read, or does not begin as an MCAP file does.
+    /// If it cannot be read, or does not begin like an MCAP file.
     pub fn open(input: &Input) -> Result<Self, Failure> {
         FileReader::open(input).map(Self::of_file)
     }
@@ -65,7 +65,7 @@ impl RecordReader {
     /// Reads from a stream.
     ///
     /// # Errors
-    /// If it does not begin as an MCAP file does.
+    /// If it does not begin like an MCAP file.
     pub fn new(name: String, input: CountedInput) -> Result<Self, Failure> {
         FileReader::new(name, input).map(Self::of_file)
     }
@@ -88,7 +88,7 @@ impl RecordReader {
         self.file.name()
     }
 
-    /// Data that were lost so far.
+    /// Data lost so far.
     pub fn losses(&self) -> &Losses {
         &self.file.losses
     }
@@ -103,10 +103,11 @@ impl RecordReader {
         self.file.is_closed
     }
 
-    /// Opcode and body of the next record, or none at the end. Of an attachment it is the front.
+    /// Opcode and body of the next record, or `None` at the end. For an attachment it is the
+    /// header.
     ///
     /// # Errors
-    /// If the file cannot be read. Damage to its content is no error: see [`Self::losses`].
+    /// If the file cannot be read. Damage to its content is not an error: see [`Self::losses`].
     pub fn next(&mut self) -> Result<Option<(u8, &[u8])>, Failure> {
         let Some((op, holder)) = self.advance()? else {
             if !std::mem::replace(&mut self.is_counted, true) {
@@ -158,7 +159,7 @@ impl RecordReader {
                 continue;
             }
             let rest = &self.records()[self.at..];
-            // The rest of a chunk that was cut off has been reported already.
+            // The rest of a truncated chunk has been reported already.
             if !rest.is_empty() && !self.file.is_ended {
                 let at = self.record_offset;
                 self.file.losses.add(Loss::Overrun { at });
@@ -185,7 +186,7 @@ impl RecordReader {
         }
     }
 
-    /// Unpacks the chunk that the file is at; what it holds is delivered next.
+    /// Decompresses the current chunk of the file; its records are delivered next.
     fn unpack(&mut self, record: FileRecord) {
         let body = self.file.body();
         let front = chunk_front(body);
@@ -207,7 +208,7 @@ impl RecordReader {
         }
         if !record.is_whole {
             if let Some((header, packed)) = front {
-                // Whatever comes out whole is used; that the chunk is cut off is said anyway.
+                // Whatever is complete is used; the truncation is reported anyway.
                 let _ = unpack_part(&header, packed, &mut self.buffer);
             }
             return;
@@ -222,7 +223,7 @@ impl RecordReader {
         }
     }
 
-    /// Takes note that the chunk that the file is at was left out.
+    /// Records that the current chunk of the file was dropped.
     fn lose_chunk(&mut self, at: u64, why: ChunkError) {
         self.buffer.clear();
         let front = chunk_front(self.file.body());
@@ -230,7 +231,7 @@ impl RecordReader {
         self.file.losses.add(Loss::Chunk { at, why, span_ns });
     }
 
-    /// Unpacks more of a long chunk behind what is not delivered yet; `false` if there is no more.
+    /// Decompresses more of a long chunk after the undelivered records; `false` at its end.
     fn unpack_more(&mut self) -> bool {
         let Some(more) = &mut self.more else {
             return false;
@@ -246,7 +247,7 @@ impl RecordReader {
             self.more = None;
             return false;
         }
-        // As much again keeps the work proportional.
+        // Doubling keeps the work proportional.
         let step = STEP.max(self.buffer.len()) as u64;
         let read = more.take(step).read_to_end(&mut self.buffer);
         let is_more = read.is_ok_and(|count| count > 0);

@@ -142,7 +142,7 @@ fn a_record_past_the_end_of_its_chunk_is_said() {
     assert_eq!(said, ["mcap-damaged-chunk", "mcap-truncated"]);
 }
 
-/// Ninety-six messages of 1 MB in one chunk of a few kB: all of them come, in memory of a few.
+/// Ninety-six messages of 1 MB in one chunk of a few kB: all are read, in the memory of a few.
 #[test]
 fn a_long_chunk_is_unpacked_piece_by_piece() {
     for compression in [Compression::Zstd, Compression::Lz4] {
@@ -161,7 +161,7 @@ fn a_long_chunk_is_unpacked_piece_by_piece() {
             assert!(reader.buffer.capacity() < 1 << 23);
         }
         assert_eq!((messages, reader.losses().count), (96, 0));
-        // A changed checksum of the chunk: it is left out as a whole.
+        // With a changed checksum, the chunk is dropped entirely.
         let mut damaged = bytes.clone();
         let chunk = super::super::super::testing::chunks(&bytes)[0];
         damaged[chunk + RECORD_HEAD + 24] ^= 1;
@@ -174,13 +174,13 @@ fn a_long_chunk_is_unpacked_piece_by_piece() {
                 ..
             }
         ));
-        // Cut off: what is whole is there.
+        // Of a truncated chunk, the complete part is read.
         let (ops, reader) = ops_of_cut(&bytes, chunk);
         assert!(ops.contains(&op::MESSAGE) && reader.losses().count == 1);
     }
 }
 
-/// The records of a file that ends in the middle of its chunk.
+/// Records of a file truncated in the middle of its chunk.
 fn ops_of_cut(bytes: &[u8], chunk: usize) -> (Vec<u8>, RecordReader) {
     let length = bytes[chunk + 1..]
         .first_chunk()

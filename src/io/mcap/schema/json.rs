@@ -1,10 +1,10 @@
-//! What JSON messages are made of, told from the messages themselves.
+//! Structure of JSON messages, derived from a message.
 
 use serde_json::Value;
 
 use super::{DEEPEST, Field, FieldKind, Number, Schema, SchemaError, Struct};
 
-/// Tells the fields of messages from one of them. Numbers count as `float64`.
+/// Derives the fields of messages from one of them. Numbers count as `float64`.
 ///
 /// # Errors
 /// [`SchemaError`] if the message is not an object.

@@ -1,22 +1,22 @@
-//! The numbers in a message: what a user can choose from.
+//! The numbers in a message, from which a user can select.
 
 use super::{DEEPEST, Field, FieldKind, Number, Schema};
 
-/// Most leaves that are listed.
+/// Maximum number of leaves listed.
 pub const MOST: usize = 1000;
 
 /// A number, or a list of numbers, in a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Leaf {
-    /// Path as a user writes it, lists with `[]`, arrays with `[3]`.
+    /// Path in user notation, lists with `[]`, arrays with `[3]`.
     pub path: String,
-    /// FieldKind of number.
+    /// Type of number.
     pub number: Number,
-    /// Unit as the definition states it.
+    /// Unit stated by the definition.
     pub unit: Option<String>,
     /// Whether it is part of a time stamp.
     pub is_stamp: bool,
-    /// Whether there are several of it in a message.
+    /// Whether a message contains several of it.
     pub is_many: bool,
 }
 
@@ -26,7 +26,7 @@ impl Leaf {
         self.with_items("[0]")
     }
 
-    /// The path with a choice of items in place of each list's length.
+    /// The path with a selection of items instead of each list's length.
     pub fn with_items(&self, item: &str) -> String {
         let mut pieces = self.path.split('[');
         let mut path = pieces.next().unwrap_or("").to_owned();
@@ -51,7 +51,7 @@ pub fn leaves(schema: &Schema) -> (Vec<Leaf>, bool) {
     (walk.found, !is_whole)
 }
 
-/// Whether a type is a time stamp: two whole numbers, of seconds and of nanoseconds.
+/// Whether a type is a time stamp: two integers, seconds and nanoseconds.
 pub fn is_stamp(schema: &Schema, index: usize) -> bool {
     let fields = &schema.structs[index].fields;
     let [seconds, nanoseconds] = &fields[..] else {
@@ -64,12 +64,12 @@ pub fn is_stamp(schema: &Schema, index: usize) -> bool {
             .all(|field| matches!(field.kind, FieldKind::Number(_)))
 }
 
-/// Names of a stamp's seconds.
+/// Whether a name means the seconds of a stamp.
 pub fn is_seconds(name: &str) -> bool {
     ["sec", "secs", "seconds"].contains(&name)
 }
 
-/// Names of a stamp's nanoseconds.
+/// Whether a name means the nanoseconds of a stamp.
 pub fn is_nanoseconds(name: &str) -> bool {
     ["nanosec", "nsec", "nsecs", "nanos", "nanoseconds"].contains(&name)
 }
@@ -84,7 +84,7 @@ struct LeafWalk<'a> {
 impl LeafWalk<'_> {
     /// False if there were too many.
     fn types(&mut self, index: usize, prefix: &str) -> bool {
-        // A type of protobuf may contain itself: its inside is listed once.
+        // A recursive protobuf type is expanded once.
         if self.above.contains(&index) || self.above.len() > DEEPEST {
             return true;
         }

@@ -1,4 +1,4 @@
-//! What messages are made of, whatever language says so.
+//! Structure of messages, independent of the definition language.
 
 pub mod json;
 pub mod leaves;
@@ -9,12 +9,12 @@ mod token;
 
 use std::fmt;
 
-/// Deepest nesting of a type.
+/// Maximum nesting depth of types.
 pub const DEEPEST: usize = 64;
-/// Most types a definition may have.
+/// Maximum number of types in a definition.
 pub const MOST_STRUCTS: usize = 4096;
 
-/// A kind of number.
+/// Type of number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[allow(missing_docs)]
 pub enum Number {
@@ -32,7 +32,7 @@ pub enum Number {
 }
 
 impl Number {
-    /// Bytes it takes in CDR and ROS 1.
+    /// Size in CDR and ROS 1.
     pub fn size(self) -> u8 {
         match self {
             Self::Bool | Self::I8 | Self::U8 => 1,
@@ -42,7 +42,7 @@ impl Number {
         }
     }
 
-    /// Name as ROS writes it.
+    /// ROS name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Bool => "bool",
@@ -60,7 +60,7 @@ impl Number {
     }
 }
 
-/// The type of a field.
+/// Type of a field.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FieldKind {
     /// A number.
@@ -69,11 +69,11 @@ pub enum FieldKind {
     Text,
     /// Text of wide characters.
     WideText,
-    /// Another type, by its place in [`Schema::structs`].
+    /// Another type, by its index in [`Schema::structs`].
     Struct(usize),
-    /// Several of the same.
+    /// Several items of the same type.
     Many(Box<Many>),
-    /// Nothing that could be read, as JSON's null.
+    /// Nothing readable, such as JSON's null.
     Nothing,
 }
 
@@ -82,7 +82,7 @@ pub enum FieldKind {
 pub struct Many {
     /// Type of each.
     pub item: FieldKind,
-    /// Their number if it is fixed.
+    /// Their number, if fixed.
     pub count: Option<u32>,
 }
 
@@ -92,7 +92,7 @@ impl FieldKind {
         Self::Many(Box::new(Many { item, count: None }))
     }
 
-    /// A list of that many.
+    /// An array of `count` items.
     pub fn array(item: Self, count: u32) -> Self {
         let count = Some(count);
         Self::Many(Box::new(Many { item, count }))
@@ -106,7 +106,7 @@ pub struct Field {
     pub name: String,
     /// Type.
     pub kind: FieldKind,
-    /// Unit, where the definition states one.
+    /// Unit, if stated by the definition.
     pub unit: Option<String>,
 }
 
@@ -121,7 +121,7 @@ impl Field {
     }
 }
 
-/// A type: fields in order.
+/// A type: ordered fields.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Struct {
     /// Full name.
@@ -130,7 +130,7 @@ pub struct Struct {
     pub fields: Vec<Field>,
 }
 
-/// A definition, resolved: types refer to each other by number.
+/// A resolved definition: types refer to each other by index.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Schema {
     /// All types.
@@ -141,17 +141,17 @@ pub struct Schema {
     pub(crate) descriptor: Option<prost_reflect::MessageDescriptor>,
 }
 
-/// Why a definition cannot be used.
+/// Reason why a definition cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SchemaError {
-    /// Line in the definition, from 1, if it can be told.
+    /// Line in the definition, from 1, if known.
     pub line: Option<usize>,
-    /// What is wrong.
+    /// The reason.
     pub why: String,
 }
 
 impl SchemaError {
-    /// An error somewhere.
+    /// An error without a line.
     pub fn new(why: impl fmt::Display) -> Self {
         Self {
             line: None,
@@ -183,7 +183,7 @@ impl Schema {
         &self.structs[self.root]
     }
 
-    /// Refuses types that contain themselves or are nested too deeply.
+    /// Rejects types that are recursive or nested too deeply.
     ///
     /// # Errors
     /// [`SchemaError`] with the type's name.
@@ -192,7 +192,7 @@ impl Schema {
         self.depth(self.root, &mut depths, 0).map(drop)
     }
 
-    /// Levels of types within a type, itself included.
+    /// Number of levels of types within a type, including itself.
     fn depth(
         &self,
         index: usize,

@@ -1,4 +1,4 @@
-//! Definitions as protobuf's `FileDescriptorSet`.
+//! Definitions as protobuf `FileDescriptorSet`.
 
 use prost::Message as _;
 use prost_reflect::{DescriptorPool, FieldDescriptor, Kind as ProtobufKind, MessageDescriptor};
@@ -6,10 +6,10 @@ use prost_types::{DescriptorProto, FileDescriptorSet};
 
 use super::{Field, FieldKind, MOST_STRUCTS, Number, Schema, SchemaError, Struct};
 
-/// Reads the definition of the type `name` and of everything it is made of.
+/// Parses the definition of the type `name` and of everything it refers to.
 ///
 /// # Errors
-/// [`SchemaError`] if the bytes are no `FileDescriptorSet` or a type is missing.
+/// [`SchemaError`] if the bytes are not a `FileDescriptorSet` or a type is missing.
 pub fn read(name: &str, bytes: &[u8]) -> Result<Schema, SchemaError> {
     let mut set = FileDescriptorSet::decode(bytes).map_err(|error| {
         SchemaError::new(format_args!("not a protobuf FileDescriptorSet: {error}"))
@@ -26,7 +26,7 @@ pub fn read(name: &str, bytes: &[u8]) -> Result<Schema, SchemaError> {
     let mut messages = vec![root.clone()];
     let mut structs = Vec::new();
     while let Some(message) = messages.get(structs.len()).cloned() {
-        // In the order of the definition; `fields()` goes by number.
+        // In the order of the definition; `fields()` is in the order of numbers.
         let names = message.descriptor_proto().field.iter().map(|f| f.name());
         let fields = names.filter_map(|name| message.get_field_by_name(name));
         structs.push(Struct {
@@ -43,7 +43,7 @@ pub fn read(name: &str, bytes: &[u8]) -> Result<Schema, SchemaError> {
     })
 }
 
-/// Lets maps be lists of entries, which keep the order they have in a message.
+/// Turns maps into lists of entries, which preserve the order of the message.
 fn keep_map_order(message: &mut DescriptorProto) {
     if let Some(options) = &mut message.options {
         options.map_entry = None;

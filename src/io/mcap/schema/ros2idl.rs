@@ -1,17 +1,17 @@
-//! Definitions in OMG IDL, as ROS 2 uses it.
+//! Definitions in OMG IDL, as used by ROS 2.
 //!
-//! <https://design.ros2.org/articles/idl_interface_definition.html>; several definitions are put
-//! together with lines of `=` and `IDL: package/msg/Name` between them.
+//! <https://design.ros2.org/articles/idl_interface_definition.html>; several definitions are joined
+//! with lines of `=` and `IDL: package/msg/Name` between them.
 
 use std::collections::HashMap;
 
 use super::token::{Token, tokens};
 use super::{Field, FieldKind, MOST_STRUCTS, Number, Schema, SchemaError, Struct};
 
-/// Most dimensions or levels of a list.
+/// Maximum number of dimensions or levels of a list.
 const DEEPEST_LIST: usize = 16;
 
-/// Reads the definition of the type `name` and of everything it is made of.
+/// Parses the definition of the type `name` and of everything it refers to.
 ///
 /// # Errors
 /// [`SchemaError`] with the line.
@@ -32,7 +32,7 @@ pub fn read(name: &str, text: &str) -> Result<Schema, SchemaError> {
 #[derive(Debug, Clone)]
 enum Written {
     FieldKind(FieldKind),
-    /// A name and the scope it is used in.
+    /// A name and the scope in which it is used.
     Named(String, Vec<String>, usize),
     Many(Box<Written>, Option<u32>),
 }
@@ -43,7 +43,7 @@ struct Member {
     unit: Option<String>,
 }
 
-/// Everything declared, by its full name.
+/// All declarations, by full name.
 #[derive(Default)]
 struct Declared {
     structs: Vec<(String, Vec<Member>)>,
@@ -225,7 +225,7 @@ impl<'a> Parser<'a, '_> {
         }
     }
 
-    /// The number that a word is the type of, with the words that belong to it; `None` if it is a name.
+    /// The number type that a word means, including further words; `None` if it is a name.
     fn number(&mut self, first: &str) -> Result<Option<Number>, SchemaError> {
         let number = match first {
             "boolean" => Number::Bool,
@@ -255,7 +255,7 @@ impl<'a> Parser<'a, '_> {
         Ok(Some(number))
     }
 
-    /// Dimensions behind a name, the last varies fastest.
+    /// Dimensions after a name; the last one varies fastest.
     fn dimensions(&mut self, kind: Written) -> Result<Written, SchemaError> {
         let mut counts = Vec::new();
         while self.skip("[") {
@@ -274,7 +274,7 @@ impl<'a> Parser<'a, '_> {
         }))
     }
 
-    /// Passes over annotations; gives the unit if one of them states it.
+    /// Skips annotations; returns the unit if one of them gives it.
     fn annotations(&mut self) -> Result<Option<String>, SchemaError> {
         let mut unit = None;
         while self.skip("@") {
@@ -343,7 +343,7 @@ impl<'a> Parser<'a, '_> {
     }
 }
 
-/// Looks a name up in its scope, then in those around it.
+/// Looks a name up in its scope, then in the enclosing ones.
 fn lookup<'v, T>(
     name: &str,
     scope: &[String],
@@ -422,7 +422,7 @@ fn kind(declared: &Declared, written: &Written, level: usize) -> Result<FieldKin
     }
 }
 
-/// A type given by its last name alone, if there is only one.
+/// A type identified by its last name only, if unique.
 fn by_last_name(declared: &Declared, name: &str) -> Option<FieldKind> {
     let wanted = name.rsplit("::").next()?;
     let mut found = declared

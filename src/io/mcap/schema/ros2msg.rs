@@ -1,13 +1,13 @@
-//! Definitions in the language of `.msg` files, of ROS 2 and of ROS 1.
+//! Definitions in the `.msg` language of ROS 2 and ROS 1.
 //!
 //! <https://design.ros2.org/articles/legacy_interface_definition.html>; several definitions are
-//! put together with lines of 80 `=` and `MSG: package/Name` between them.
+//! joined with lines of 80 `=` and `MSG: package/Name` between them.
 
 use std::collections::HashMap;
 
 use super::{Field, FieldKind, MOST_STRUCTS, Number, Schema, SchemaError, Struct};
 
-/// Which generation of ROS wrote the definition.
+/// Generation of ROS that wrote the definition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Generation {
     /// ROS 1: has `time` and `duration`, a byte is signed.
@@ -16,10 +16,10 @@ pub enum Generation {
     Ros2,
 }
 
-/// Fewest `=` in a line that parts two definitions.
+/// Minimum number of `=` in a line that separates two definitions.
 const SEPARATOR: usize = 80;
 
-/// Reads the definition of the type `name` and of everything it is made of.
+/// Parses the definition of the type `name` and of everything it refers to.
 ///
 /// # Errors
 /// [`SchemaError`] with the line.
@@ -212,7 +212,7 @@ fn code(line: &str) -> &str {
     line.split_once('#').map_or(line, |(code, _)| code)
 }
 
-/// Type and name of a field; none for a constant, a comment or anything else.
+/// Type and name of a field; `None` for a constant, a comment or anything else.
 fn declaration(line: &str) -> Option<(&str, &str)> {
     let mut words = code(line).split_whitespace();
     let (kind, name) = (words.next()?, words.next()?);
@@ -224,7 +224,7 @@ fn declaration(line: &str) -> Option<(&str, &str)> {
     (is_name && !is_constant).then_some((kind, name))
 }
 
-/// `TYPE NAME=value`, the value of a text may hold anything.
+/// `TYPE NAME=value`; the value of a text may contain anything.
 fn is_constant(line: &str) -> bool {
     let mut words = line.splitn(2, char::is_whitespace);
     let (_, rest) = (words.next(), words.next().unwrap_or("").trim_start());

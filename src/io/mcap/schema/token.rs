@@ -1,8 +1,8 @@
-//! Words and signs of an IDL definition.
+//! Tokens of an IDL definition.
 
 use super::SchemaError;
 
-/// A word, a sign, a number or a quoted text, and the line it is in.
+/// A word, a sign, a number or a quoted text, and its line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Token<'a> {
     /// As written; quoted text without its quotes.
@@ -13,7 +13,7 @@ pub struct Token<'a> {
     pub line: usize,
 }
 
-/// Takes a definition apart. Comments, preprocessor lines and lines of `=` are left out.
+/// Splits a definition into tokens. Comments, preprocessor lines and lines of `=` are skipped.
 ///
 /// # Errors
 /// [`SchemaError`] if a quote or a comment is not closed.
@@ -70,7 +70,7 @@ fn closed(text: &str, end: &str, line: usize) -> Result<usize, SchemaError> {
         .ok_or_else(|| SchemaError::at(line, "a comment is not closed"))
 }
 
-/// Length of a quoted text with both quotes.
+/// Length of a quoted text, including both quotes.
 fn quoted(text: &str, line: usize) -> Result<usize, SchemaError> {
     let mut is_escaped = false;
     for (at, byte) in text.bytes().enumerate().skip(1) {
@@ -84,7 +84,7 @@ fn quoted(text: &str, line: usize) -> Result<usize, SchemaError> {
     Err(SchemaError::at(line, "a quote is not closed"))
 }
 
-/// Length of a word with its `::` and `.`, or of one sign.
+/// Length of a word including `::` and `.`, or of one sign.
 fn word(text: &str) -> usize {
     let mut length = 0;
     while let Some(next) = text[length..].chars().next() {

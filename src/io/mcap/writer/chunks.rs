@@ -1,4 +1,4 @@
-//! Messages put together into chunks with their indexes.
+//! Grouping of messages into chunks with their indexes.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -9,20 +9,20 @@ use super::index::FileIndex;
 use super::sink::{RecordSink, body, push_record};
 use crate::io::mcap::record::chunk::pack;
 
-/// Bytes of records that a chunk is closed at.
+/// Size of records at which a chunk is closed, in bytes.
 const FULL: usize = 1 << 20;
 
 /// A chunk under construction.
 pub(super) struct ChunkBuilder {
-    /// None for records that stand in the file by themselves.
+    /// `None` for records outside of chunks.
     compression: Option<String>,
     records: Vec<u8>,
-    /// Log time and place of the messages of each channel.
+    /// Log time and offset of the messages of each channel.
     places: BTreeMap<u16, Vec<MessageIndexEntry>>,
 }
 
 impl ChunkBuilder {
-    /// An empty chunk: `zstd`, `lz4` or empty for no compression; none for no chunk at all: an
+    /// An empty chunk: `zstd`, `lz4` or empty for no compression; `None` for no chunks at all. An
     /// index of chunks would hide messages outside of chunks, so a file has either.
     pub fn new(compression: Option<&str>) -> Self {
         Self {
@@ -50,7 +50,7 @@ impl ChunkBuilder {
         self.records.len() >= FULL
     }
 
-    /// Writes it, if there is anything in it, and begins anew.
+    /// Writes it, if not empty, and starts a new one.
     pub fn write<W: Write>(
         &mut self,
         sink: &mut RecordSink<W>,
@@ -94,7 +94,7 @@ impl ChunkBuilder {
     }
 }
 
-/// What the summary says of a chunk that begins at a byte; lengths and indexes are still missing.
+/// Summary entry of a chunk at an offset, without lengths and indexes.
 pub(super) fn chunk_index(header: ChunkHeader, chunk_start_offset: u64) -> ChunkIndex {
     ChunkIndex {
         message_start_time: header.message_start_time,

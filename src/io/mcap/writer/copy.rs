@@ -1,4 +1,4 @@
-//! The data of a file, copied as they are.
+//! Verbatim copy of the data of a file.
 
 use std::io::Write;
 
@@ -13,10 +13,10 @@ use crate::io::mcap::record::chunk::{chunk_front, unpack, unpack_part};
 use crate::io::mcap::record::file::{FileReader, FileRecord, IN_ATTACHMENT, Loss};
 use crate::io::mcap::record::{RawMessage, attachment_front, each_record, parse};
 
-/// What was copied.
+/// Result of copying.
 pub(super) struct CopiedFile {
     pub index: FileIndex,
-    /// Compression of most of its chunks, by their number; none if it has messages, but no chunks.
+    /// Compression of most of its chunks, by number; `None` if it has messages, but no chunks.
     pub compression: Option<&'static str>,
 }
 
@@ -45,7 +45,7 @@ pub(super) fn copy<W: Write>(
         }
         copier.record(record)?;
     }
-    // It may be too long to be held, so that it ends too early is found only in copying it.
+    // It may be too long to be held, so truncation is only detected during copying.
     for loss in &copier.file.losses.first {
         if let Loss::Truncated { at, what } = loss
             && *what == IN_ATTACHMENT
@@ -80,14 +80,14 @@ struct Copier<'a, W: Write> {
     sink: &'a mut RecordSink<W>,
     output_name: &'a str,
     index: FileIndex,
-    /// Unpacked records of a chunk.
+    /// Decompressed records of a chunk.
     records: Vec<u8>,
-    /// Whether the indexes that follow belong to a chunk that was copied.
+    /// Whether the indexes that follow belong to a copied chunk.
     is_chunk_copied: bool,
 }
 
 impl<W: Write> Copier<'_, W> {
-    /// Copies one record, or leaves it out.
+    /// Copies one record, or drops it.
     fn record(&mut self, record: FileRecord) -> Result<(), Failure> {
         let offset = self.sink.offset();
         let body = self.file.body();
@@ -125,7 +125,7 @@ impl<W: Write> Copier<'_, W> {
             let Some((header, packed)) = front else {
                 return Ok(());
             };
-            // What is whole of it is used; that the rest is missing is among the losses.
+            // The complete part is used; the truncation is reported in the losses.
             let _ = unpack_part(&header, packed, &mut self.records);
             return self.salvage(&header.compression);
         }
@@ -151,7 +151,7 @@ impl<W: Write> Copier<'_, W> {
         Ok(())
     }
 
-    /// Writes the whole records of a chunk that is cut off as a chunk.
+    /// Writes the complete records of a truncated chunk as a chunk.
     fn salvage(&mut self, compression: &str) -> Result<(), Failure> {
         let mut chunk = ChunkBuilder::new(Some(compression));
         let index = &mut self.index;
@@ -195,7 +195,7 @@ impl<W: Write> Copier<'_, W> {
     }
 }
 
-/// Takes note of a record.
+/// Records a copied record in the index.
 fn note(index: &mut FileIndex, op: u8, body: &[u8]) {
     match op {
         op::MESSAGE => {

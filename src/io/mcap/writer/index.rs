@@ -1,4 +1,4 @@
-//! What is in the file that is written, for the summary at its end.
+//! Content of the written file, for its summary.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
@@ -10,10 +10,10 @@ use mcap::records::{
 
 use super::sink::{RecordSink, body, push_record};
 
-/// Everything the summary says.
+/// Content of the summary.
 #[derive(Default)]
 pub(super) struct FileIndex {
-    /// Bodies of the schemas by number, as the file declares them.
+    /// Bodies of the schemas by number, as declared in the file.
     pub schemas: BTreeMap<u16, Vec<u8>>,
     /// Bodies of the channels by number.
     pub channels: BTreeMap<u16, Vec<u8>>,
@@ -92,12 +92,12 @@ where
     records.iter().map(body).collect()
 }
 
-/// The footer holds the checksum of the summary and of its own front.
+/// Writes the footer, with the checksum of the summary and of the footer's own start.
 fn footer<W: Write>(sink: &mut RecordSink<W>, start: u64, offsets_start: u64) -> io::Result<()> {
     let places = [start.to_le_bytes(), offsets_start.to_le_bytes()].concat();
     let mut front = Vec::new();
     push_record(&mut front, op::FOOTER, &places);
-    // Its length counts the checksum as well.
+    // Its length includes the checksum.
     front[1] += 4;
     sink.write(&front)?;
     let crc = sink.take_crc();

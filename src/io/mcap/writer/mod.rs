@@ -1,11 +1,11 @@
-//! A copy of an MCAP file with one channel more.
+//! Copying of an MCAP file with an additional channel.
 //!
-//! The data of the input are copied byte for byte: every schema, channel, message, attachment,
-//! metadata record and record of unknown kind, chunks as they are compressed. Behind them come
-//! chunks with the added channel, in the compression that most chunks of the input have (or its
-//! messages by themselves, if those of the input are), and a metadata record `torqcomp`; then the summary of everything. So the added messages are behind
-//! the others in the file, and readers put them in order of time by the index. A chunk that is
-//! damaged is left out; what is whole of a chunk that is cut off becomes a chunk of its own.
+//! The data of the input are copied verbatim: every schema, channel, message, attachment, metadata record and record of
+//! unknown kind, with chunks in their compressed form. They are followed by chunks with the added channel, in the
+//! compression of most chunks of the input (or by messages without chunks, as in the input), and a metadata record
+//! `torqcomp`; then the summary of everything. So the added messages come after the others in the file, and readers
+//! sort them by time using the index. A damaged chunk is dropped; the complete part of a truncated chunk becomes a
+//! separate chunk.
 
 mod chunks;
 mod copy;
@@ -29,10 +29,10 @@ use torque::TorqueMessage;
 /// Name of the metadata record with the provenance.
 pub const METADATA: &str = "torqcomp";
 
-/// Topic of the added channel unless another is named.
+/// Default topic of the added channel.
 pub const TOPIC: &str = "/torqcomp/compensated_torque";
 
-/// Key in the metadata of the added channel that marks it: its value is `true`.
+/// Key in the metadata of the added channel that marks it, with the value `true`.
 pub const COMPENSATED_KEY: &str = "compensated";
 
 /// The channel that is added.
@@ -40,7 +40,7 @@ pub const COMPENSATED_KEY: &str = "compensated";
 pub struct Added {
     /// Its topic.
     pub topic: String,
-    /// Name of the joint or channel that the torque is of.
+    /// Name of the joint or channel of the torque.
     pub name: String,
     /// Encoding of its messages.
     pub encoding: Encoding,
@@ -49,7 +49,7 @@ pub struct Added {
 /// A copy under construction.
 pub struct Writer<W: Write> {
     sink: RecordSink<W>,
-    /// Name of the output, for people.
+    /// Name of the output, for messages.
     name: String,
     index: FileIndex,
     chunk: ChunkBuilder,
@@ -60,10 +60,10 @@ pub struct Writer<W: Write> {
 }
 
 impl<W: Write> Writer<W> {
-    /// Copies a file and declares the channel that is added. `output_name` is for messages.
+    /// Copies a file and declares the added channel. `output_name` is for messages.
     ///
     /// # Errors
-    /// If the input cannot be read or the output not be written, or the topic is taken.
+    /// If the input cannot be read or the output cannot be written, or the topic exists already.
     pub fn copying(
         input: &Input,
         output: W,
@@ -105,12 +105,12 @@ impl<W: Write> Writer<W> {
         })
     }
 
-    /// Path of the torque in the added messages, as `effort[0]`.
+    /// Path of the torque in the added messages, such as `effort[0]`.
     pub fn field(&self) -> &'static str {
         self.torque.field()
     }
 
-    /// Adds a torque in N m: its time for the message's own stamp and its log time, both in ns.
+    /// Adds a torque in N m, with the message's own stamp and its log time, both in ns.
     ///
     /// # Errors
     /// If the output cannot be written.
@@ -132,7 +132,7 @@ impl<W: Write> Writer<W> {
         Ok(())
     }
 
-    /// Writes the provenance and the summary, and gives the output back.
+    /// Writes the provenance and the summary, and returns the output.
     ///
     /// # Errors
     /// If the output cannot be written.
@@ -160,7 +160,8 @@ impl<W: Write> Writer<W> {
     }
 }
 
-/// Declares schema and channel in the first chunk; gives the channel's number, or none if all are taken.
+/// Declares schema and channel in the first chunk; returns the channel's number, or `None` if all are
+/// taken.
 fn declare(
     index: &mut FileIndex,
     chunk: &mut ChunkBuilder,
@@ -182,7 +183,7 @@ fn declare(
     let Some(schema_id) = known.or_else(|| (1..=u16::MAX).find(unused)) else {
         return Ok(None);
     };
-    // Declared in the chunk in any case, which can then be read by itself.
+    // Declared in the chunk in any case, which is then self-contained.
     let schema = schema(schema_id)?;
     chunk.record(op::SCHEMA, &schema);
     index.schemas.insert(schema_id, schema);
@@ -191,7 +192,7 @@ fn declare(
     let Some(id) = (1..=u16::MAX).find(unused) else {
         return Ok(None);
     };
-    // Of this field alone: a joint state has positions and velocities too.
+    // For this field only: a joint state also has positions and velocities.
     let unit_key = format!("unit.{}", torque.field().trim_end_matches("[0]"));
     let channel = body(&Channel {
         id,

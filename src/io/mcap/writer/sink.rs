@@ -1,4 +1,4 @@
-//! Records on their way out, counted and with their checksum.
+//! Output of records with byte count and checksum.
 
 use std::io::{self, Cursor, Write};
 
@@ -22,7 +22,7 @@ pub(super) fn push_record(records: &mut Vec<u8>, op: u8, body: &[u8]) {
     records.extend_from_slice(body);
 }
 
-/// An output that knows how far it is.
+/// An output that keeps track of its offset.
 pub(super) struct RecordSink<W> {
     out: W,
     offset: u64,
@@ -43,7 +43,7 @@ impl<W: Write> RecordSink<W> {
         self.offset
     }
 
-    /// Checksum of what was written since the last call.
+    /// Checksum of the bytes written since the last call.
     pub fn take_crc(&mut self) -> u32 {
         std::mem::take(&mut self.crc).finalize()
     }
@@ -61,7 +61,7 @@ impl<W: Write> RecordSink<W> {
         self.write(body)
     }
 
-    /// Gives the output back, flushed.
+    /// Returns the output, flushed.
     pub fn finish(mut self) -> io::Result<W> {
         self.out.flush()?;
         Ok(self.out)

@@ -79,7 +79,7 @@ fn the_data_are_copied_byte_for_byte_and_the_torque_is_added() {
     for options in all {
         let before = original(options);
         let after = copy(&before, Encoding::Cdr);
-        // Everything up to the end of the data is the same.
+        // Everything up to the end of the data is unchanged.
         let same = before
             .iter()
             .zip(&after)

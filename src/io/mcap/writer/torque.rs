@@ -1,8 +1,8 @@
-//! The message that holds a torque, in the encoding of the file.
+//! The torque message, in the encoding of the file.
 //!
-//! For ROS it is `sensor_msgs/JointState`: it has a header with a stamp, its `effort` is defined
-//! as the torque of a turning joint in N m, and position and velocity may be left empty, so
-//! nothing is said that is not known. A `WrenchStamped` would have to claim five other components.
+//! For ROS it is `sensor_msgs/JointState`: it has a header with a stamp, its `effort` is defined as
+//! the torque of a revolute joint in N m, and position and velocity may be empty, so nothing
+//! unknown is claimed. A `WrenchStamped` would have to claim five other components.
 
 use prost::Message as _;
 use prost_types::field_descriptor_proto::{Label, Type};
@@ -72,7 +72,7 @@ impl TorqueMessage {
         }
     }
 
-    /// Encoding of the messages, as the channel names it.
+    /// Encoding of the messages, as named in the channel.
     pub fn message_encoding(&self) -> &'static str {
         match self.encoding {
             Encoding::Cdr => "cdr",
@@ -112,8 +112,8 @@ impl TorqueMessage {
         }
     }
 
-    /// Appends the message of a torque in N m at a time in ns. JSON has no word for a value that
-    /// is not finite; it is written as null.
+    /// Appends the message with a torque in N m at a time in ns. JSON cannot represent non-finite
+    /// values, which are written as null.
     pub fn write(&mut self, time_ns: i64, torque_n_m: f64, out: &mut Vec<u8>) {
         let seconds = time_ns.div_euclid(1_000_000_000);
         let nanoseconds = time_ns.rem_euclid(1_000_000_000) as u32;
@@ -142,7 +142,7 @@ impl TorqueMessage {
         };
         out.extend_from_slice(&(seconds as i32).to_le_bytes());
         out.extend_from_slice(&nanoseconds.to_le_bytes());
-        // frame_id, empty: its end alone.
+        // frame_id, empty: only the terminator.
         out.extend_from_slice(&[1, 0, 0, 0, 0]);
         pad(out, 4);
         out.extend_from_slice(&1_u32.to_le_bytes());
@@ -189,8 +189,8 @@ struct ProtobufTorque {
     torque_n_m: f64,
 }
 
-/// `message Torque { google.protobuf.Timestamp timestamp = 1; string name = 2;
-/// double compensated_torque_n_m = 3; }`, with what it needs.
+/// `message Torque { google.protobuf.Timestamp timestamp = 1; string name = 2; double
+/// compensated_torque_n_m = 3; }`, with its dependencies.
 fn descriptor() -> Vec<u8> {
     let stamp_file = "google/protobuf/timestamp.proto";
     let stamp_type = Some(".google.protobuf.Timestamp");

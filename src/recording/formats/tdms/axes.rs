@@ -1,4 +1,4 @@
-//! Channels of a TDMS file, and how they lie in time.
+//! Channels of a TDMS file, and their time axes.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -14,10 +14,10 @@ use crate::recording::{TimeAxis, without_rounding};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
-/// Most properties of the file that are told.
+/// Maximum number of file properties reported.
 const TOLD: usize = 50;
 
-/// A channel of numbers, or of times alone.
+/// A channel of numbers, or of times only.
 struct ScaledChannel {
     object: TdmsObject,
     values: Vec<f64>,
@@ -40,7 +40,7 @@ impl ScaledChannel {
         self.values.is_empty()
     }
 
-    /// Whether its values can be the times of others.
+    /// Whether its values can be the times of other channels.
     fn is_time(&self) -> bool {
         self.is_times()
             || is_time_name(&self.object.path[1])
@@ -49,10 +49,10 @@ impl ScaledChannel {
     }
 }
 
-/// Makes channels of the objects that have samples.
+/// Converts objects with samples to channels.
 ///
 /// # Errors
-/// If options for the time do not fit.
+/// If options for the time do not apply.
 pub(super) fn channels(
     objects: TdmsObjects,
     reading: &Reading,
@@ -102,7 +102,7 @@ pub(super) fn channels(
     Ok(())
 }
 
-/// Channels with their scaled values, and those of which there are none.
+/// Channels with scaled values, and the names of those without.
 fn scaled(objects: TdmsObjects) -> (Vec<ScaledChannel>, Vec<String>) {
     let (mut file, mut groups) = (Properties::new(), HashMap::new());
     for object in &objects.all {
@@ -139,7 +139,7 @@ fn scaled(objects: TdmsObjects) -> (Vec<ScaledChannel>, Vec<String>) {
     (found, left_out)
 }
 
-/// Which channels are times of others, by their group.
+/// Channels that contain the times of others, by group.
 struct GroupTimes {
     of_group: HashMap<String, Vec<usize>>,
 }
@@ -170,7 +170,7 @@ impl GroupTimes {
         Ok(Self { of_group })
     }
 
-    /// The only channel of the same group and length that has the times of one.
+    /// Index of the only channel of the same group and length that contains times for a channel.
     fn place(&self, found: &[ScaledChannel], one: &ScaledChannel) -> Option<usize> {
         let places = self.of_group.get(one.group())?;
         let mut fitting = places.iter().filter(|place| {
@@ -186,7 +186,7 @@ impl GroupTimes {
     }
 }
 
-/// What is doubtful about the time axis of a channel.
+/// Doubts about the time axis of a channel.
 fn doubts(object: &TdmsObject, name: &str) -> Option<Warning> {
     if let Some(unit) = other_dimension(object) {
         let message = format!(
@@ -211,7 +211,7 @@ fn doubts(object: &TdmsObject, name: &str) -> Option<Warning> {
     }
 }
 
-/// The unit of the horizontal axis, if it is not one of time.
+/// Unit of the horizontal axis, if it is not time.
 fn other_dimension(object: &TdmsObject) -> Option<&str> {
     match object.time_unit_s() {
         Some(_) => None,
@@ -219,7 +219,7 @@ fn other_dimension(object: &TdmsObject) -> Option<&str> {
     }
 }
 
-/// The axis that the properties of a waveform give; times count from the first start in the file.
+/// The axis given by waveform properties; times are relative to the first start in the file.
 fn of_waveform(object: &TdmsObject, first_ns: Option<i64>) -> Option<TimeAxis> {
     let unit_s = object.time_unit_s()?;
     if object.changed == Some("wf_increment") {
@@ -244,7 +244,7 @@ fn of_waveform(object: &TdmsObject, first_ns: Option<i64>) -> Option<TimeAxis> {
     Some(axis)
 }
 
-/// The axis that a channel of times gives.
+/// The axis given by a channel of times.
 fn of_times(times: &ScaledChannel, reading: &Reading) -> Result<TimeAxis, Failure> {
     let name = times.name();
     if let (Some(first_ns), true) = (times.object.times_ns.first(), times.is_times()) {
@@ -275,7 +275,7 @@ fn of_times(times: &ScaledChannel, reading: &Reading) -> Result<TimeAxis, Failur
     ))
 }
 
-/// What the file says of itself.
+/// Properties of the file.
 fn details(objects: &TdmsObjects) -> Vec<(String, String)> {
     let file = objects.all.iter().find(|object| object.path.is_empty());
     let properties = file.into_iter().flat_map(|file| &file.properties);

@@ -1,7 +1,8 @@
-//! LabVIEW TDMS files (TDMS TdmsFile Format Internal Structure, National Instruments): channels of all groups with their units,
-//! waveform times and scales, of files with and without DAQmx raw data.
+//! LabVIEW TDMS files (TDMS File Format Internal Structure, National Instruments): channels of all groups with their
+//! units, waveform times and scales, with and without DAQmx raw data.
 //!
-//! A file is a row of segments, each with a lead-in, metadata that may refer to those before, and chunks of raw data.
+//! A file is a sequence of segments, each with a lead-in, metadata that may refer to previous ones, and chunks of raw
+//! data.
 
 mod axes;
 mod objects;
@@ -29,16 +30,16 @@ const NEW_LIST: u32 = 1 << 2;
 const RAW_DATA: u32 = 1 << 3;
 const INTERLEAVED: u32 = 1 << 5;
 const BIG_ENDIAN: u32 = 1 << 6;
-/// Length of a segment that was not closed.
+/// Length of an unclosed segment.
 const OPEN: u64 = u64::MAX;
-/// Bytes that are decoded at a time.
+/// Number of bytes decoded at a time.
 const PIECE: u64 = 1 << 18;
 
 fn is(head: &[u8]) -> bool {
     head.starts_with(TAG)
 }
 
-/// RawRows of equal width in a chunk.
+/// Rows of equal width in a chunk.
 struct RawRows {
     count: u64,
     width: u64,
@@ -53,7 +54,7 @@ struct RawField {
     stored: RawType,
 }
 
-/// How raw data lie in a chunk.
+/// Layout of raw data in a chunk.
 #[derive(Default)]
 struct ChunkLayout {
     parts: Vec<RawRows>,
@@ -64,7 +65,7 @@ struct ChunkLayout {
 struct TdmsFile {
     objects: TdmsObjects,
     chunk: ChunkLayout,
-    /// Whether metadata were read since the chunk was laid out, or how its rows lie has changed.
+    /// Whether metadata were read since the layout was computed, or its row layout changed.
     is_stale: bool,
     is_interleaved: bool,
     segments: usize,
@@ -90,7 +91,7 @@ fn read(bytes: &mut Bytes, reading: &Reading) -> Result<Content, Failure> {
                 content.lost = Some(cut(&what));
                 break;
             }
-            // What lies before is whole.
+            // What precedes is complete.
             Err(failure) if file.has_samples() => {
                 let message = format!(
                     "segment {} and what lies behind it are lost: {failure}",
@@ -181,7 +182,7 @@ impl TdmsFile {
         Next::Cut(format!("{place} of segment {}", self.segments))
     }
 
-    /// Reads metadata; whether they were all there.
+    /// Reads metadata; returns whether they are complete.
     fn metadata(
         &mut self,
         bytes: &mut Bytes,
@@ -204,7 +205,7 @@ impl TdmsFile {
         Ok(true)
     }
 
-    /// Reads the chunks of a segment, of a length that is known or up to the end of the file.
+    /// Reads the chunks of a segment, of known length or up to the end of the file.
     fn raw_data(
         &mut self,
         bytes: &mut Bytes,
@@ -265,7 +266,7 @@ impl RawRows {
         self.count.saturating_mul(self.width)
     }
 
-    /// Reads so many rows; whether they were all there.
+    /// Reads a number of rows; returns whether all were there.
     fn read(
         &self,
         bytes: &mut Bytes,
@@ -322,7 +323,7 @@ impl RawField {
     }
 }
 
-/// How the data of the listed objects lie in a chunk.
+/// Layout of the listed objects' data in a chunk.
 fn laid_out(
     objects: &mut TdmsObjects,
     is_interleaved: bool,
@@ -380,7 +381,7 @@ fn laid_out(
 }
 
 impl ChunkLayout {
-    /// Adds the values of a channel: in rows of their own, or beside those of the others.
+    /// Adds the values of a channel: in separate rows, or next to those of the others.
     fn values(
         &mut self,
         mut field: RawField,
@@ -408,7 +409,7 @@ impl ChunkLayout {
         Ok(())
     }
 
-    /// Adds the scalers of an object, whose values lie in buffers of rows.
+    /// Adds the scalers of an object with values in buffers of rows.
     fn buffers(
         &mut self,
         (place, object): (usize, &mut objects::TdmsObject),

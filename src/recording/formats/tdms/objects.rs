@@ -1,4 +1,4 @@
-//! TdmsObjects of a TDMS file: their properties and where their raw data lie, as the metadata of segments state them.
+//! Objects of a TDMS file: their properties and the location of their raw data, from the metadata of segments.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -7,11 +7,11 @@ use super::super::damaged;
 use crate::failure::{ErrorCode, Failure};
 use crate::unit::NamedUnit;
 
-/// Identifier of data that no DAQmx scaler made, and input of a scale that takes the data as they are stored.
+/// Identifier of data without a DAQmx scaler, and input of a scale that uses the stored data.
 pub(super) const RAW: u32 = u32::MAX;
-/// Seconds from 1904, where LabVIEW counts from, to 1970.
+/// Seconds from 1904, the origin of LabVIEW times, to 1970.
 const TO_1970_S: i64 = 2_082_844_800;
-/// A time that was never set: the start of 1904.
+/// An unset time: the start of 1904.
 pub(super) const NEVER_NS: i64 = -TO_1970_S * 1_000_000_000;
 
 /// Value of a property.
@@ -25,7 +25,7 @@ pub(super) enum Property {
 
 pub(super) type Properties = BTreeMap<String, Property>;
 
-/// How one value is stored.
+/// Storage of a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum RawType {
     Number(Number),
@@ -43,14 +43,14 @@ impl RawType {
     }
 }
 
-/// Values of one scaler, or of a channel without any.
+/// Values of one scaler, or of a channel without scalers.
 #[derive(Debug, Default)]
 pub(super) struct RawSeries {
     pub(super) scale_id: u32,
     pub(super) values: Vec<f64>,
 }
 
-/// A DAQmx scaler: where the values of one scale lie in the rows of a buffer.
+/// A DAQmx scaler: location of the values of one scale in the rows of a buffer.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scaler {
     pub(super) stored: RawType,
@@ -59,14 +59,14 @@ pub(super) struct Scaler {
     pub(super) scale_id: u32,
 }
 
-/// Where the values of an object lie in a chunk of raw data.
+/// Location of an object's values in a chunk of raw data.
 #[derive(Debug, Clone)]
 pub(super) enum RawIndex {
     Values {
         stored: RawType,
         count: u64,
     },
-    /// No numbers, so many bytes in all.
+    /// Not numbers; total size in bytes.
     Other {
         bytes: u64,
     },
@@ -80,24 +80,24 @@ pub(super) enum RawIndex {
 /// The file, a group or a channel.
 #[derive(Debug, Default)]
 pub(super) struct TdmsObject {
-    /// Group and channel, as far as it has them.
+    /// Group and channel, if any.
     pub(super) path: Vec<String>,
     pub(super) properties: Properties,
     pub(super) index: Option<RawIndex>,
-    /// Whether the current segment has data of it.
+    /// Whether the current segment contains its data.
     pub(super) has_data: bool,
     pub(super) series: Vec<RawSeries>,
     pub(super) times_ns: Vec<i64>,
-    /// Why its data are no numbers.
+    /// Why its data are not numeric.
     pub(super) left_out: Option<&'static str>,
     /// Property of its time axis that changed after samples had been stored.
     pub(super) changed: Option<&'static str>,
-    /// List of objects that it is in, counted from 1.
+    /// Index of the object list that contains it, from 1.
     list: u64,
 }
 
 impl TdmsObject {
-    /// Samples so far.
+    /// Number of samples so far.
     pub(super) fn len(&self) -> usize {
         let series = self.series.iter().map(|series| series.values.len());
         series.min().unwrap_or(self.times_ns.len())
@@ -110,7 +110,7 @@ impl TdmsObject {
         }
     }
 
-    /// The unit of the horizontal axis in s, which is usual; `None` if it is no unit of time.
+    /// The unit of the horizontal axis in s, usually 1; `None` if it is not a unit of time.
     pub(super) fn time_unit_s(&self) -> Option<f64> {
         let Some(unit) = self.text("wf_xunit_string") else {
             return Some(1.0);
@@ -134,7 +134,7 @@ impl TdmsObject {
         }
     }
 
-    /// Sets a property. What says where the first sample lies stays once there are samples.
+    /// Sets a property. Those that locate the first sample are fixed once there are samples.
     fn set(&mut self, key: String, value: Property) {
         let count = self.len();
         let fixed = ["wf_increment", "wf_start_offset", "wf_start_time"];
@@ -144,7 +144,7 @@ impl TdmsObject {
             let unit_s = self.time_unit_s().unwrap_or(1.0);
             let step_s = unit_s * self.number("wf_increment").unwrap_or(0.0);
             let is_next = match (before, &value) {
-                // Each waveform may state its own start.
+                // Each waveform may give its own start.
                 (Property::Time(first), Property::Time(now)) => {
                     let off_s = now.wrapping_sub(*first) as f64 * 1e-9 - step_s * count as f64;
                     off_s.abs() <= 0.5 * step_s
@@ -159,7 +159,7 @@ impl TdmsObject {
         self.properties.insert(key, value);
     }
 
-    /// Place of the series with an identifier.
+    /// Index of the series with an identifier.
     pub(super) fn series_of(&mut self, scale_id: u32) -> usize {
         let place = self.series.iter().position(|s| s.scale_id == scale_id);
         place.unwrap_or_else(|| {
@@ -182,10 +182,10 @@ pub(super) struct TdmsObjects {
 }
 
 impl TdmsObjects {
-    /// Reads the metadata of a segment.
+    /// Parses the metadata of a segment.
     ///
     /// # Errors
-    /// If they contradict themselves or have data of unknown types.
+    /// If they are inconsistent or have data of unknown types.
     pub(super) fn read(
         &mut self,
         fields: &mut MetadataFields,
@@ -221,7 +221,7 @@ impl TdmsObjects {
     }
 }
 
-/// Parts of a path: `/'group'/'it''s'`.
+/// Components of a path: `/'group'/'it''s'`.
 fn parts(path: &str) -> Vec<String> {
     let mut parts = Vec::new();
     let mut left = path;
@@ -234,10 +234,10 @@ fn parts(path: &str) -> Vec<String> {
     parts
 }
 
-/// Metadata, read from front to end.
+/// A sequential reader of metadata.
 pub(super) struct MetadataFields<'a> {
     pub(super) bytes: &'a [u8],
-    /// Place of the rest in the file.
+    /// Position of the remainder in the file.
     pub(super) at: u64,
     pub(super) order: Order,
 }
@@ -275,7 +275,7 @@ impl<'a> MetadataFields<'a> {
         Ok(String::from_utf8_lossy(self.take(count.into())?).into_owned())
     }
 
-    /// Reads a property; `None` if its type has no use.
+    /// Reads a property; `None` if its type is not used.
     fn property(&mut self, key: &str) -> Result<Option<Property>, Failure> {
         let (at, kind) = (self.at, self.u32()?);
         if kind == TEXT {
@@ -294,7 +294,7 @@ impl<'a> MetadataFields<'a> {
         }))
     }
 
-    /// Reads where the data of an object lie.
+    /// Reads the location of an object's data.
     fn index(&mut self, object: &mut TdmsObject) -> Result<(), Failure> {
         let at = self.at;
         let kind = self.u32()?;
@@ -356,7 +356,7 @@ impl<'a> MetadataFields<'a> {
         }
     }
 
-    /// Reads an index of raw DAQmx data; of digital lines, the offset counts bits.
+    /// Reads an index of raw DAQmx data; for digital lines, the offset counts bits.
     fn daqmx(&mut self, is_digital: bool) -> Result<RawIndex, Failure> {
         let kind = self.u32()?;
         self.dimension()?;
@@ -375,7 +375,7 @@ impl<'a> MetadataFields<'a> {
                 }
             };
             let (buffer, offset) = (self.u32()? as usize, self.u32()?);
-            // The bitmap of the format of a sample.
+            // The sample-format bitmap.
             self.take(if is_digital { 1 } else { 4 })?;
             let scale_id = self.u32()?;
             scalers.push(Scaler {
@@ -385,7 +385,7 @@ impl<'a> MetadataFields<'a> {
                 },
                 buffer,
                 offset: offset as usize / if is_digital { 8 } else { 1 },
-                // Data of another type are those of their only scaler.
+                // Other data types have a single scaler.
                 scale_id: if kind == DAQMX_DATA { scale_id } else { RAW },
             });
         }
@@ -405,14 +405,14 @@ impl<'a> MetadataFields<'a> {
 const NO_DATA: u32 = u32::MAX;
 const AS_BEFORE: u32 = 0;
 const DAQMX: u32 = 0x1269;
-/// As DAQmx writes it, and as the documentation has it.
+/// As written by DAQmx, and as documented.
 const DAQMX_DIGITAL: u32 = 0x126a;
 const DAQMX_DIGITAL_DOCUMENTED: u32 = 0x1369;
-/// Types that are no numbers of fixed width.
+/// Types other than numbers of fixed width.
 const TEXT: u32 = 0x20;
 const DAQMX_DATA: u32 = u32::MAX;
 
-/// How values of a type are stored, if they are numbers or times, and in how many bytes.
+/// Storage of values of a type, if they are numbers or times, and their size in bytes.
 fn stored(kind: u32) -> Option<(Option<RawType>, u64)> {
     let number = match kind {
         1..=4 => Number::Signed(1 << (kind - 1)),
@@ -429,7 +429,7 @@ fn stored(kind: u32) -> Option<(Option<RawType>, u64)> {
     Some((Some(RawType::Number(number)), number.width() as u64))
 }
 
-/// A time stamp in nanoseconds since 1970: seconds since 1904 and 2⁻⁶⁴ of one, the less significant first if the order is.
+/// A time stamp in nanoseconds since 1970: seconds since 1904 and units of 2⁻⁶⁴ s, in the given byte order.
 pub(super) fn time_ns(bytes: &[u8], order: Order) -> i64 {
     let mut wide: [u8; 16] = bytes.try_into().unwrap_or_default();
     if order == Order::Big {

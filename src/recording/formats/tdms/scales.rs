@@ -1,4 +1,5 @@
-//! Scales of TDMS channels (`NI_Scale[n]_…`): what the stored numbers mean, as DAQmx and LabVIEW leave it to the reader.
+//! Scales of TDMS channels (`NI_Scale[n]_…`): the meaning of the stored numbers, which DAQmx and LabVIEW leave to the
+//! reader.
 //!
 //! Equations of the bridges: NI, Strain Gauge Configuration Types; of resistance thermometers: Callendar and Van Dusen
 //! (IEC 60751); of thermistors: Steinhart and Hart.
@@ -9,7 +10,7 @@ use super::objects::{Properties, Property, RAW, RawSeries};
 const BY_CURRENT: f64 = 10_134.0;
 const BY_VOLTAGE: f64 = 10_322.0;
 
-/// Where a scale takes its input from.
+/// Input of a scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum ScaleSource {
     Stored,
@@ -18,22 +19,22 @@ enum ScaleSource {
 
 #[derive(Debug, PartialEq)]
 enum ChannelScale {
-    /// Nobody takes its result.
+    /// Result not used.
     Unused,
     /// The values of a DAQmx scaler.
     Scaler(usize),
     Same(ScaleSource),
     Polynomial(ScaleSource, Vec<f64>),
-    /// Pairs of input and output, the inputs rising.
+    /// Pairs of input and output, in ascending order of input.
     Table(ScaleSource, Vec<[f64; 2]>),
-    /// The second with a factor of 1 or −1 for the first.
+    /// The second plus the first times a factor of 1 or −1.
     Sum([ScaleSource; 2], f64),
     Bridge(ScaleSource, StrainBridge),
     Thermometer(ScaleSource, Thermometer),
     Thermistor(ScaleSource, Thermistor),
 }
 
-/// Strain `−k r / (a + b r)` of the ratio `r` of bridge voltage above `initial_v` and excitation.
+/// Strain `−k r / (a + b r)` from the ratio `r` of bridge voltage above `initial_v` to excitation.
 #[derive(Debug, PartialEq)]
 struct StrainBridge {
     initial_v: f64,
@@ -67,7 +68,7 @@ struct Thermistor {
     offset: f64,
 }
 
-/// The values of a channel: those of its series through the scales of the channel, of its group or of the file.
+/// Values of a channel: its series through the scales of the channel, its group or the file.
 ///
 /// # Errors
 /// Why there are none.
@@ -100,7 +101,7 @@ pub(super) fn scaled(
     Ok(values.collect())
 }
 
-/// How many scales are to be applied, if any.
+/// Number of scales to be applied, if any.
 fn scale_count(properties: &Properties) -> Option<f64> {
     let is_done = matches!(properties.get("NI_Scaling_Status"), Some(Property::Text(text)) if text == "scaled");
     let count = match properties.get("NI_Number_Of_Scales") {
@@ -117,7 +118,7 @@ fn scale_count(properties: &Properties) -> Option<f64> {
     (count >= 1.0 && !is_done).then_some(count)
 }
 
-/// The scales that the last one needs.
+/// The scales required by the last one.
 fn chain(
     properties: &Properties,
     count: f64,
@@ -154,7 +155,7 @@ fn chain(
     Ok(scales)
 }
 
-/// The properties of a scale.
+/// Properties of a scale.
 struct ScaleKeys<'a> {
     properties: &'a Properties,
     number: usize,
@@ -173,7 +174,7 @@ impl ScaleKeys<'_> {
         }
     }
 
-    /// The numbers `KEY[0]` to one below `KEY_Size`, of which there are `otherwise` if the size is not given.
+    /// The numbers `KEY[0]` up to `KEY_Size` minus one; `otherwise` is the size if not given.
     fn numbers(&self, key: &str, otherwise: Option<f64>) -> Result<Vec<f64>, String> {
         let size = self.f64(&format!("{key}_Size"));
         let size = otherwise.map_or(size.clone(), |count| Ok(size.unwrap_or(count)))?;
@@ -218,7 +219,7 @@ impl ScaleKeys<'_> {
             ),
             "Table" => ChannelScale::Table(source, self.table()?),
             "Add" => ChannelScale::Sum([operand("Left"), operand("Right")], 1.0),
-            // The left one from the right one, as the readers of NI have it.
+            // The left one subtracted from the right one, as in NI's readers.
             "Subtract" => ChannelScale::Sum([operand("Left"), operand("Right")], -1.0),
             "Strain" => ChannelScale::Bridge(source, self.bridge()?),
             "RTD" => ChannelScale::Thermometer(source, self.thermometer()?),
@@ -278,7 +279,7 @@ impl ScaleKeys<'_> {
         })
     }
 
-    /// Resistance of the leads that is in the one measured.
+    /// Lead resistance included in the measured one.
     fn leads_ohm(&self, kind: &str, is_by_current: bool) -> Result<f64, String> {
         let wires = self.f64(&format!("{kind}_Resistance_Configuration"))?;
         let each = self.f64(&format!("{kind}_Lead_Wire_Resistance"))?;
@@ -333,7 +334,7 @@ impl ChannelScale {
         }
     }
 
-    /// The result for a sample, of what is stored and the results of the scales before.
+    /// Result for a sample, from the stored value and the results of preceding scales.
     fn apply(&self, stored: f64, sample: usize, series: &[RawSeries], results: &[f64]) -> f64 {
         let of = |source: &ScaleSource| match source {
             ScaleSource::Stored => stored,
@@ -357,7 +358,7 @@ impl ChannelScale {
     }
 }
 
-/// The value of a table of straight lines, beyond its ends that of the end.
+/// Linear interpolation in a table, constant beyond its ends.
 fn interpolated(pairs: &[[f64; 2]], x: f64) -> f64 {
     let above = pairs.partition_point(|pair| pair[0] <= x);
     match (above.checked_sub(1), pairs.get(above)) {
@@ -386,7 +387,7 @@ impl Thermometer {
         if ratio >= 1.0 {
             return t;
         }
-        // Newton's steps: at −200 °C four leave nothing of the difference of 2 K.
+        // Newton's method: at −200 °C four steps eliminate the difference of 2 K.
         for _ in 0..8 {
             let off = 1.0 + t * (a + t * (b + (t - 100.0) * c * t)) - ratio;
             t -= off / (a + t * (2.0 * b + t * c * (4.0 * t - 300.0)));

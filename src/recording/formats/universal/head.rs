@@ -1,25 +1,25 @@
-//! The head of a data set 58.
+//! Header of a data set 58.
 
 use super::super::bytes::Number;
 use super::lines::Lines;
 use crate::failure::Failure;
 
-/// Lines of the head.
+/// Number of header lines.
 const HEAD_LINES: usize = 11;
-/// Kind of an axis of time.
+/// Axis type for time.
 const TIME: i64 = 17;
 
-/// The head of a data set 58.
+/// Header of a data set 58.
 pub(super) struct Head {
     pub(super) name: String,
     pub(super) function: i64,
-    /// Kind of number: 2 single, 4 double, 5 and 6 the same of complex ones.
+    /// Data type: 2 single, 4 double, 5 and 6 the same for complex numbers.
     pub(super) kind: i64,
     pub(super) count: usize,
     pub(super) is_even: bool,
     pub(super) start: f64,
     pub(super) step: f64,
-    /// Kinds and texts of both axes: abscissa, ordinate.
+    /// Type and text of both axes: abscissa, ordinate.
     pub(super) axes: [Axis; 2],
 }
 
@@ -35,7 +35,7 @@ pub(super) fn field<T: std::str::FromStr>(line: &str, from: usize, width: usize)
     field.trim().parse().ok()
 }
 
-/// A text in a field; `NONE` is none.
+/// A text in a field; `NONE` means empty.
 pub(super) fn text(line: &str, from: usize, width: usize) -> String {
     let field: String = line.chars().skip(from).take(width).collect();
     match field.trim() {
@@ -91,7 +91,7 @@ impl Head {
         }))
     }
 
-    /// Numbers in all, and those of a sample.
+    /// Total number of values, and values per sample.
     pub(super) fn numbers(&self) -> (usize, usize) {
         let each = match (self.is_even, self.kind) {
             (true, 5 | 6) => 2,
@@ -102,7 +102,7 @@ impl Head {
         (self.count.saturating_mul(each), each)
     }
 
-    /// Why it is no channel over time, if it is none.
+    /// Why it is not a function of time, if so.
     pub(super) fn foreign(&self) -> Option<&'static str> {
         let is_over_time =
             self.axes[0].kind == TIME || (self.axes[0].kind == 0 && self.function == 1);
@@ -114,7 +114,7 @@ impl Head {
         }
     }
 
-    /// Bytes of the numbers of a data set 58b; its abscissas are single or double as the numbers are.
+    /// Number type of a data set 58b; its abscissas are single or double like the values.
     pub(super) fn width(&self) -> Number {
         match self.kind {
             2 | 5 => Number::Float32,
@@ -123,7 +123,7 @@ impl Head {
     }
 }
 
-/// What a function is called: its first line, else its node and direction, else the label of its axis.
+/// Name of a function: its first line, otherwise node and direction, otherwise the label of its axis.
 pub(super) fn name(head: &[String], ordinate: &Axis) -> String {
     let identified = text(&head[0], 0, 80);
     let response = text(&head[5], 31, 10);

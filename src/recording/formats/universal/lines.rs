@@ -4,23 +4,23 @@ use super::super::bytes::Bytes;
 use super::super::damaged;
 use crate::failure::Failure;
 
-/// Longest line.
+/// Maximum line length.
 const LONGEST_LINE: usize = 4096;
-/// Bytes read ahead at a time.
+/// Number of bytes read ahead at a time.
 const PIECE: u64 = 1 << 16;
 
-/// The lines of a file, with bytes between them.
+/// Lines of a file, and bytes between them.
 pub(super) struct Lines<'a> {
     pub(super) bytes: &'a mut Bytes,
     pub(super) ahead: Vec<u8>,
-    /// Bytes of `ahead` that are used.
+    /// Number of bytes of `ahead` consumed.
     pub(super) used: usize,
-    /// Lines read so far.
+    /// Number of lines read so far.
     pub(super) number: usize,
 }
 
 impl Lines<'_> {
-    /// Reads ahead, so that a byte more is there if the file has one.
+    /// Reads ahead, so that at least one more byte is available if the file has one.
     pub(super) fn fill(&mut self) -> Result<bool, Failure> {
         if self.used > self.ahead.len() / 2 {
             self.ahead.drain(..self.used);
@@ -70,7 +70,7 @@ impl Lines<'_> {
     }
 }
 
-/// The numbers of a line of fixed fields, or between spaces where the fields are not those of the standard.
+/// Numbers in a line of fixed fields, or separated by spaces if the fields deviate from the standard.
 pub(super) fn numbers_of(line: &str, widths: &[usize], values: &mut Vec<f64>) -> bool {
     let number = |text: &str| -> Option<f64> {
         // FORTRAN writes double precision with a D.

@@ -1,7 +1,7 @@
 //! Universal files (UFF, UNV) with data sets 58 and 58b, functions over time (SDRC Universal File Format, data set 58).
 //!
-//! A data set stands between lines `    -1`. Each of 58 is one channel: eleven lines of head and the numbers, as text or (58b) as
-//! bytes. Functions over another axis than time are named and left out.
+//! A data set is enclosed by lines `    -1`. Each data set 58 is one channel: eleven header lines and the numbers, as
+//! text or (58b) as bytes. Functions of anything other than time are listed and left out.
 
 mod head;
 mod lines;
@@ -34,7 +34,7 @@ fn is(head: &[u8]) -> bool {
     begins && number.starts_with("  ") && number.trim().parse::<u32>().is_ok()
 }
 
-/// How the numbers of a data set are stored.
+/// Storage of the numbers of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Storage {
     Text,
@@ -56,7 +56,7 @@ fn read(bytes: &mut Bytes, _: &Reading) -> Result<Content, Failure> {
             continue;
         }
         let Some(mut line) = lines.next()? else { break };
-        // Between data sets are two such lines.
+        // Two such lines separate data sets.
         while line.trim() == "-1" {
             line = lines.next()?.unwrap_or_default();
         }
@@ -87,7 +87,7 @@ fn read(bytes: &mut Bytes, _: &Reading) -> Result<Content, Failure> {
     Ok(content)
 }
 
-/// How the numbers of a data set are stored, by its line with 58.
+/// Storage of the numbers of a data set, from its line with 58.
 fn storage(line: &str, lines: &Lines) -> Result<Storage, Failure> {
     if !line
         .chars()
@@ -118,7 +118,7 @@ fn storage(line: &str, lines: &Lines) -> Result<Storage, Failure> {
     Ok(Storage::Binary(order, count))
 }
 
-/// Reads a data set 58; whether it was whole.
+/// Reads a data set 58; returns whether it was complete.
 fn data_set(
     lines: &mut Lines,
     storage: Storage,
@@ -170,7 +170,7 @@ fn data_set(
     Ok(is_whole)
 }
 
-/// The numbers of a data set of text, as many as the file has of them, and the line behind them.
+/// The numbers of a text data set, as many as the file contains, and the line after them.
 fn text_values(lines: &mut Lines, wanted: usize, head: &Head) -> Result<Vec<f64>, Failure> {
     let widths: &[usize] = match (head.kind, head.is_even) {
         (2 | 5, _) => &[13],
@@ -193,13 +193,13 @@ fn text_values(lines: &mut Lines, wanted: usize, head: &Head) -> Result<Vec<f64>
         }
     }
     if values.len() >= wanted {
-        // The end of the data set; what it is otherwise is looked at next.
+        // Skips to the end of the data set; its type is checked next.
         while lines.next()?.is_some_and(|line| line.trim() != "-1") {}
     }
     Ok(values)
 }
 
-/// The rate of the fewest digits whose step is the one that stands there with six: 2.26757E-05 s is 44100 Hz.
+/// The rate with the fewest digits whose step equals the stated one to six digits: 2.26757E-05 s is 44100 Hz.
 fn roundest_rate(step: f64) -> f64 {
     let half = 0.5 * 10.0_f64.powi(step.log10().floor() as i32 - 5);
     let rounded = (1..=6).filter_map(|count| digits::text(1.0 / step, count).parse::<f64>().ok());
@@ -212,7 +212,7 @@ fn roundest_rate(step: f64) -> f64 {
 /// The channel of a data set.
 fn made(head: &Head, name: &str, values: &[f64], lines: &Lines) -> Result<Channel, Failure> {
     let [abscissa, ordinate] = &head.axes;
-    // The standard has seconds; another unit of time is taken at its word.
+    // The standard prescribes seconds; another unit of time is accepted as written.
     let unit = NamedUnit::parse(&abscissa.unit).filter(NamedUnit::is_time);
     let second = unit.map_or(1.0, |unit| unit.unit.factor());
     let (axis, samples) = if head.is_even {

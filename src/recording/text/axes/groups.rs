@@ -1,13 +1,13 @@
-//! Which channels belong to which column of time.
+//! Assignment of channels to time columns.
 
-/// A group of columns that hold the same time in different ways, and the channels it belongs to.
+/// A group of columns with the same time in different formats, and its channels.
 pub(super) struct Group {
     pub(super) times: Vec<usize>,
     pub(super) channels: Vec<usize>,
 }
 
-/// Puts channels to their columns of time: neighbouring ones are ways to write the same time; where
-/// several stand apart, each belongs to the channels after it.
+/// Assigns channels to time columns: adjacent ones are different formats of the same time; several
+/// separate ones each belong to the channels after them.
 pub(super) fn groups(times: &[usize], used: &[usize]) -> Vec<Group> {
     let mut blocks: Vec<Vec<usize>> = Vec::new();
     for place in used.iter().filter(|place| times.contains(place)) {
@@ -24,7 +24,7 @@ pub(super) fn groups(times: &[usize], used: &[usize]) -> Vec<Group> {
         .collect();
     let first_is_time = used.first().is_some_and(|place| times.contains(place));
     if blocks.len() < 2 || !first_is_time {
-        // All share one axis; further columns of time are channels like others.
+        // All share one axis; further time columns are ordinary channels.
         let mut blocks = blocks.into_iter();
         let times = blocks.next().unwrap_or_default();
         let mut channels: Vec<usize> = channels.into_iter().chain(blocks.flatten()).collect();

@@ -1,16 +1,17 @@
-//! Columns whose names are those of time, but whose values are not used so.
+//! Columns named like time whose values are not used as such.
 
 use super::groups::Group;
 use super::{AxisRule, Sources};
 use crate::warning::Warning;
 
-/// Fewest rows that two columns of time are compared by.
+/// Minimum number of rows for comparing two time columns.
 const ROWS: usize = 20;
-/// Most that the middle of the time differs between two ways to write it, as a part of the whole.
+/// Largest difference of the middle of two formats of the same time, relative to the range.
 const ALIKE: f64 = 0.05;
 
 impl Sources<'_> {
-    /// A warning of a column that is named as time but falls, where no other gives the time.
+    /// A warning about a column named like time whose values fall, if no other column gives the
+    /// time.
     pub(super) fn falling_time(&self, used: &[usize], times: &[usize]) -> Option<Warning> {
         let named = |place: &&usize| self.fields[**place].is_named_time();
         let place = used.iter().find(named).filter(|_| times.is_empty())?;
@@ -24,8 +25,8 @@ impl Sources<'_> {
         ))
     }
 
-    /// Warnings of columns of numbers that were left out beside the time because of their names, but do
-    /// not run as it does.
+    /// Warnings about numeric columns that were left out because of their names, but differ from the
+    /// time.
     pub(super) fn other_times(&self, group: &Group, rule: &AxisRule) -> Vec<Warning> {
         let Some(rule) = &rule.stamps else {
             return Vec::new();
@@ -55,7 +56,7 @@ impl Sources<'_> {
     }
 }
 
-/// Whether the middle of two columns of time differs.
+/// Whether two time columns differ in the middle.
 fn runs_otherwise(values: &[f64], stamps: &[f64]) -> bool {
     let end = values.len().min(stamps.len()) - 1;
     let middle = |all: &[f64]| (all[end / 2] - all[0]) / (all[end] - all[0]);

@@ -1,4 +1,4 @@
-//! Which columns are time, and the axis of every other column.
+//! Detection of time columns, and the axis of every other column.
 
 mod groups;
 mod left_out;
@@ -20,43 +20,44 @@ use crate::warning::Warning;
 use groups::{Group, groups};
 pub use stamps::StampRule;
 
-/// Largest difference of a rate in the head from that of the stamps for both to mean the same.
+/// Largest relative difference of a header rate from that of the stamps for both to mean the same.
 const SAME: f64 = 0.02;
-/// Relative difference of the two that is nothing but the rounding of the stamps.
+/// Relative difference of the two explained by rounding of the stamps.
 const ROUNDED: f64 = 1e-6;
-/// Most that rounding moves the last stamp against the first, in steps of their last digit.
+/// Largest effect of rounding on the last stamp relative to the first, in steps of their last
+/// digit.
 const QUANTA: f64 = 1.2;
 
-/// What a column is.
+/// Role of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// A channel, and the place among the rules of its time.
+    /// A channel, and the index of the rule for its time.
     Channel(usize),
     /// Time stamps.
     Time,
-    /// The number of the sample.
+    /// Sample number.
     Index,
-    /// Nothing of use: empty, or texts.
+    /// Not used: empty, or text.
     Nothing,
 }
 
-/// What the columns of a table are and where their time comes from, as its first rows show.
+/// Roles of the columns of a table and rules for their time, from its first rows.
 #[derive(Debug, Clone, Default)]
 pub struct AxisPlan {
-    /// One for each column.
+    /// One per column.
     pub roles: Vec<Role>,
-    /// Where time comes from.
+    /// Rules for time.
     pub rules: Vec<AxisRule>,
-    /// What should be known of columns named as time.
+    /// Warnings about columns named like time.
     pub warnings: Vec<Warning>,
 }
 
-/// Where the time of channels comes from.
+/// Rule for the time of channels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisRule {
-    /// The stamps, if there are any.
+    /// The stamps, if any.
     pub stamps: Option<StampRule>,
-    /// The rate in the head and the words that give it.
+    /// The header rate and the words that give it.
     header: Option<(String, f64)>,
     header_start_s: Option<f64>,
     given_hz: Option<f64>,
@@ -64,28 +65,28 @@ pub struct AxisRule {
     assumed: Option<String>,
 }
 
-/// What the axes are found from.
+/// Data for finding the axes.
 pub struct Sources<'a> {
-    /// The columns' headings.
+    /// Headings of the columns.
     pub fields: &'a [Field],
-    /// What they hold.
+    /// Content of the columns.
     pub kinds: &'a [ColumnKind],
-    /// The first date or time of each, as written.
+    /// First date or time of each column, as written.
     pub clock_texts: &'a [Option<String>],
-    /// Their values in the first rows.
+    /// Values in the first rows.
     pub columns: &'a [Column],
-    /// What the head says.
+    /// Header entries.
     pub entries: &'a [Entry],
-    /// Decimal mark of the head.
+    /// Decimal mark of the header.
     pub decimal: u8,
-    /// Unit of time where a maker's files never name it.
+    /// Unit of time for makers whose files never name it.
     pub default_time_unit: Option<&'a str>,
-    /// What the user says.
+    /// Settings of the user.
     pub reading: &'a Reading,
 }
 
 impl AxisRule {
-    /// What was taken for granted and should be confirmed.
+    /// Assumption that should be confirmed.
     pub fn assumed(&self) -> Option<&str> {
         self.assumed.as_deref().filter(|_| self.given_hz.is_none())
     }
@@ -121,8 +122,8 @@ impl AxisRule {
         axis
     }
 
-    /// Where stamps are too coarse to give the rate but agree with the head on the whole, or differ from
-    /// it by their rounding only, the head's rate is the better one.
+    /// If stamps are too coarse for the rate but agree with the header overall, or differ from it only
+    /// by rounding, the header rate is better.
     fn prefer_header(&self, axis: &mut TimeAxis) {
         let (Some(stamps), Some((words, hz))) = (&axis.stamps_s, &self.header) else {
             return;
@@ -147,10 +148,10 @@ impl AxisRule {
 }
 
 impl Sources<'_> {
-    /// Finds what the columns are, and the rules of their time.
+    /// Determines the roles of the columns, and the rules for their time.
     ///
     /// # Errors
-    /// If the user names a column that is not there, or a unit that is none.
+    /// If the user names a column that does not exist, or an invalid unit.
     pub fn find(&self) -> Result<AxisPlan, Failure> {
         let count = self.fields.len();
         let has_data = |place: &usize| !self.columns[*place].values.is_empty();
@@ -174,7 +175,7 @@ impl Sources<'_> {
                 .for_each(|place| roles[*place] = Role::Time);
             let rule = self.rule(&group, named.assumed.as_deref())?;
             warnings.extend(self.other_times(&group, &rule));
-            // The time of columns without numbers is no channel.
+            // The time of columns without numbers is not a channel.
             let is_channel = |place: &&usize| !self.fields[**place].is_label;
             for place in group.channels.iter().filter(is_channel) {
                 roles[*place] = Role::Channel(rules.len());
@@ -188,13 +189,13 @@ impl Sources<'_> {
         })
     }
 
-    /// Where the time of a group comes from.
+    /// Rule for the time of a group.
     fn rule(&self, group: &Group, assumed: Option<&str>) -> Result<AxisRule, Failure> {
         let header = self.header_rate(group.channels.first().or(group.times.first()).copied());
         let stamps = self.stamp_rule(group, header.as_ref().map(|(_, hz)| *hz))?;
         let stamps = stamps.or_else(|| self.rule_of_steps());
         let of_stamps = stamps.as_ref().and_then(|rule| rule.assumed.as_deref());
-        // Date and time in words are better than a count of ticks.
+        // A textual date and time is better than a tick count.
         let is_count = |text: &String| text.bytes().all(|byte| byte.is_ascii_digit());
         let mut start_text = stamps.as_ref().and_then(|rule| rule.start_text.clone());
         if start_text.as_ref().is_none_or(is_count) {
@@ -213,7 +214,7 @@ impl Sources<'_> {
         })
     }
 
-    /// The rate of a channel that the head gives for it alone.
+    /// The header rate for a single channel.
     fn with_own_rate(&self, mut rule: AxisRule, place: usize) -> AxisRule {
         if rule.stamps.is_none() {
             rule.header = self.header_rate(Some(place)).or(rule.header);
@@ -221,9 +222,9 @@ impl Sources<'_> {
         rule
     }
 
-    /// Rate in the head for a column (or for all), and the words that give it.
+    /// Header rate for a column (or for all), and the words that give it.
     fn header_rate(&self, place: Option<usize>) -> Option<(String, f64)> {
-        // The frequency of a signal may stand above the rate.
+        // The frequency of a signal may precede the rate.
         let is_vague = |entry: &&Entry| keys::is_vague(&entry.key);
         let clear = self.entries.iter().filter(|entry| !is_vague(entry));
         clear
@@ -240,7 +241,8 @@ impl Sources<'_> {
     }
 
     fn header_start(&self) -> Option<f64> {
-        // "Start" alone may count samples, as Keysight's Infiniium has it beside "XOrg".
+        // A bare "Start" may count samples, as in Keysight's Infiniium, which has it next to
+        // "XOrg".
         let is_bare = |entry: &&keys::Entry| {
             entry
                 .key
@@ -260,8 +262,8 @@ impl Sources<'_> {
             .or_else(|| self.start_of_position())
     }
 
-    /// Start as Rohde & Schwarz write it: position of the trigger, less the part of the record before
-    /// the reference point.
+    /// Start as written by Rohde & Schwarz: position of the trigger minus the part of the record
+    /// before the reference point.
     fn start_of_position(&self) -> Option<f64> {
         let value = |key: &str| {
             let entry = self
@@ -278,7 +280,7 @@ impl Sources<'_> {
     }
 }
 
-/// Whether values count up by one.
+/// Whether values are consecutive integers.
 fn is_counting(values: &[f64]) -> bool {
     values.len() > 1
         && values[0].fract() == 0.0

@@ -1,4 +1,4 @@
-//! Which columns hold time, and which only count.
+//! Detection of time columns and index columns.
 
 use super::stamps::seconds_of_step;
 use super::{Sources, is_counting};
@@ -10,10 +10,10 @@ use crate::recording::text::rows::ColumnKind;
 use crate::recording::text::units;
 use crate::recording::{falls, typical_step};
 
-/// Fewest rows of a first column without a name that rises steadily for it to be taken for time.
+/// Minimum number of steadily rising rows for an unnamed first column to be time.
 const STEADY_ROWS: usize = 8;
 
-/// Columns of time, and what was taken for granted about them.
+/// Time columns, and assumptions about them.
 pub(super) struct TimePlaces {
     pub(super) times: Vec<usize>,
     pub(super) assumed: Option<String>,
@@ -29,8 +29,8 @@ impl TimePlaces {
 }
 
 impl Sources<'_> {
-    /// The columns of time: the one the user names, those named as time, the one with a unit of time,
-    /// or a first column that can be nothing else.
+    /// The time columns: the one named by the user, those named like time, the one with a unit of
+    /// time, or a first column that can be nothing else.
     pub(super) fn time_places(&self, used: &[usize]) -> Result<TimePlaces, Failure> {
         if let Some(wanted) = &self.reading.time_column {
             let place = self.given_time(wanted)?;
@@ -54,7 +54,7 @@ impl Sources<'_> {
         if !rising.is_empty() {
             return Ok(TimePlaces::sure(rising));
         }
-        // Rows from the last to the first.
+        // Rows in reverse order.
         let mut reversed = named.into_iter();
         if let Some(place) = reversed.find(|place| falls(&self.columns[*place].values)) {
             return Ok(TimePlaces::sure(vec![place]));
@@ -78,7 +78,7 @@ impl Sources<'_> {
         Ok(axis)
     }
 
-    /// The column that the user names, by its number among all columns as well.
+    /// The column named by the user, also by its number among all columns.
     fn given_time(&self, wanted: &str) -> Result<usize, Failure> {
         let label = |field| Field::label(field);
         let labels: Vec<Label> = self.fields.iter().map(label).collect();
@@ -98,8 +98,8 @@ impl Sources<'_> {
             && is_first_t()
     }
 
-    /// Of the columns named as time, those whose values rise as time does, and of these the ways to
-    /// write the first one's time and its repetitions before other channels.
+    /// Among the columns named like time, those whose values rise like time, and of these the
+    /// different formats of the first one's time and its repetitions before other channels.
     fn told_by_values(&self, named: &[usize], used: &[usize]) -> Vec<usize> {
         let mut times: Vec<usize> = Vec::new();
         let mut first_block = 0;
@@ -122,7 +122,7 @@ impl Sources<'_> {
         times
     }
 
-    /// Whether a column of time is named as one of the first: by the same word, or both are dates.
+    /// Whether a time column is named like one of the first: by the same word, or both are dates.
     fn repeats(&self, place: usize, first: &[usize]) -> bool {
         let stem = |place: usize| units::time_stem(&self.fields[place].name);
         first.iter().any(|other| {
@@ -133,7 +133,7 @@ impl Sources<'_> {
         })
     }
 
-    /// Whether a column that falls holds the parts of the seconds in the column before it.
+    /// Whether a falling column contains the fractional seconds of the preceding column.
     fn is_part(&self, place: usize, whole: usize) -> bool {
         let whole = &self.columns[whole];
         let are_whole = || whole.values.iter().all(|value| value.fract() == 0.0);
@@ -141,8 +141,8 @@ impl Sources<'_> {
         are_whole() && parts.iter().all(|part| *part >= 0.0 && part.fract() == 0.0)
     }
 
-    /// A first column named as time or temperature, where nothing else is the time and it always rises;
-    /// and its like before further channels.
+    /// A first column named like time or temperature, if no other is time and it always rises, and
+    /// similar columns before further channels.
     fn weakly_named(&self, used: &[usize]) -> Vec<usize> {
         let is_weak = |place: usize| {
             let field = &self.fields[place];
@@ -156,7 +156,7 @@ impl Sources<'_> {
         let counts = |place: &usize| self.is_index(*place, used);
         match used {
             [first, ..] if is_time(*first) => {}
-            // After a column that counts, T is a temperature, but t1 a time.
+            // After an index column, T is a temperature, but t1 a time.
             [index, first, ..]
                 if counts(index)
                     && is_time(*first)
@@ -190,7 +190,7 @@ impl Sources<'_> {
         if used.iter().any(|place| !self.is_unnamed(*place)) {
             return TimePlaces::sure(Vec::new());
         }
-        // A first column may count the samples, and the second be the time.
+        // A first column may be an index, and the second the time.
         let second = used.get(1).copied().filter(|_| is_counting(values));
         if let Some(second) = second.filter(|second| self.is_of_header_rate(*second)) {
             return TimePlaces::sure(vec![second]);
@@ -206,7 +206,7 @@ impl Sources<'_> {
             "column {} has no heading but rises steadily: it was taken for the time",
             first + 1
         );
-        // Each channel may have the same time before it.
+        // Each channel may be preceded by the same time.
         let is_same = |place: &usize| self.columns[*place].values == *values;
         TimePlaces {
             times: used.iter().copied().filter(is_same).collect(),
@@ -218,7 +218,7 @@ impl Sources<'_> {
         self.fields[place].heading == Field::unnamed(place).heading
     }
 
-    /// Whether the steps of a column are those of the rate in the head, in seconds or parts of them.
+    /// Whether the steps of a column match the header rate, in seconds or fractions of them.
     fn is_of_header_rate(&self, place: usize) -> bool {
         let step = typical_step(&self.columns[place].values);
         match (step, self.header_rate(None)) {
@@ -227,8 +227,8 @@ impl Sources<'_> {
         }
     }
 
-    /// Seconds per unit of the first two columns of a table without headings that begins with the whole seconds since 1970
-    /// and their nanoseconds, as `ros2 topic echo --csv` writes a stamp.
+    /// Seconds per unit of the first two columns of a table without headings that begins with the whole seconds since
+    /// 1970 and their nanoseconds, as written by `ros2 topic echo --csv`.
     pub(super) fn stamp_without_heading(&self, place: usize) -> Option<f64> {
         let (seconds, nanoseconds) = (self.columns.first()?, self.columns.get(1)?);
         let origin = match self.kinds[0] {
@@ -245,8 +245,8 @@ impl Sources<'_> {
         matches!(self.kinds[place], ColumnKind::Clock(_))
     }
 
-    /// Whether a first column without a heading, beside others with one, holds whole numbers that rise: the rows' labels of
-    /// a data frame, some of whose rows were left out.
+    /// Whether a first column without a heading, among others with one, contains rising integers: the row labels of a
+    /// data frame from which some rows were removed.
     pub(super) fn is_row_label(&self, place: usize, used: &[usize]) -> bool {
         let values = &self.columns[place].values;
         let name = &self.fields[place].name;
@@ -261,10 +261,10 @@ impl Sources<'_> {
     pub(super) fn is_index(&self, place: usize, used: &[usize]) -> bool {
         let field = &self.fields[place];
         let is_first = used.first() == Some(&place);
-        // `NO.` may stand in the row of units.
+        // `NO.` may be in the row of units.
         let is_numbered = is_first && field.unit_text.as_deref().is_some_and(units::is_index_name);
         let is_named = units::is_index_name(&field.name) || field.is_label || is_numbered;
-        // Without a heading it counts where the others have one, or where the head gives the rate.
+        // Without a heading it is an index if the others have one, or if the header gives the rate.
         let may_count = || {
             units::is_axis_name(&field.name)
                 || self.is_unnamed(place)
@@ -278,8 +278,8 @@ impl Sources<'_> {
     }
 }
 
-/// Whether values rise or stay as stamps do: all but one in ten steps, or all but one. A clock that was
-/// set back or began anew now and then is a clock still.
+/// Whether values rise or stay like stamps: all but one in ten steps, or all but one. A clock that was
+/// occasionally set back or restarted is still a clock.
 fn mostly_rises(values: &[f64]) -> bool {
     let falls = values.windows(2).fold(0_usize, |falls, pair| {
         falls + usize::from(pair[1] < pair[0])

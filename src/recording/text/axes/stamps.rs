@@ -1,4 +1,4 @@
-//! Time stamps in seconds, as columns give them.
+//! Time stamps in seconds from columns.
 
 use super::groups::Group;
 use super::{SAME, Sources, is_counting};
@@ -10,41 +10,41 @@ use crate::recording::{seconds_assumed, typical_step};
 use crate::unit::NamedUnit;
 use torqcomp_model::Unit;
 
-/// How stamps come out of the columns of a table.
+/// Derivation of stamps from the columns of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StampRule {
     /// Heading of the column.
     pub heading: String,
-    /// Its place.
+    /// Index of the column.
     pub place: usize,
     /// Seconds per unit of its values.
     pub seconds_per_unit: f64,
     /// Unit of its values, for messages.
     pub unit: &'static str,
-    /// Nanoseconds at which its values are zero.
+    /// Origin of its values in ns.
     pub origin_ns: i64,
-    /// Nanoseconds since 1970, or since midnight, at which its values are zero, if they are dates or times of day.
+    /// Origin of its values in ns since 1970, or since midnight, if they are dates or times of day.
     pub clock_ns: Option<i64>,
-    /// Whether they are times of day, which begin anew at midnight.
+    /// Whether they are times of day, which restart at midnight.
     pub is_time_of_day: bool,
-    /// The column with the parts of a second of each stamp, if they stand in one of their own.
+    /// The column with the fractional seconds of each stamp, if separate.
     pub parts: Option<Parts>,
-    /// Whether each value is the time since the row before.
+    /// Whether each value is the time since the preceding row.
     pub is_sum: bool,
     /// Date and time of the first one as written.
     pub start_text: Option<String>,
-    /// What was taken for granted.
+    /// Assumption made.
     pub assumed: Option<String>,
 }
 
-/// A column with the parts of a second.
+/// A column with fractional seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parts {
-    /// Its place.
+    /// Index of the column.
     pub place: usize,
     /// Seconds per unit of its values.
     seconds_per_unit: f64,
-    /// The whole seconds of the first row, which are taken off the others, so that no digit of the parts is lost.
+    /// The whole seconds of the first row, subtracted from the others to preserve the precision of the fraction.
     whole: f64,
 }
 
@@ -91,14 +91,14 @@ impl StampRule {
         }
     }
 
-    /// Whether each row has its stamp in one cell, whatever the other rows say.
+    /// Whether each row has its stamp in one cell, independent of other rows.
     pub fn is_of_one_cell(&self) -> bool {
         !self.is_sum && self.parts.is_none()
     }
 }
 
 impl Sources<'_> {
-    /// How a group's stamps are found: of the ways the file writes them, the finest that has a step.
+    /// The stamps of a group: the finest format with a step.
     pub(super) fn stamp_rule(
         &self,
         group: &Group,
@@ -130,7 +130,7 @@ impl Sources<'_> {
         Ok(Some(best))
     }
 
-    /// Whether a column holds the time from one sample to the next, as `INTERVAL` of data loggers.
+    /// Whether a column contains the time between samples, like `INTERVAL` of data loggers.
     pub(super) fn is_steps(&self, place: usize) -> bool {
         const NAMES: [&str; 4] = [
             "interval",
@@ -148,7 +148,7 @@ impl Sources<'_> {
             && values.iter().all(|value| *value >= 0.0)
     }
 
-    /// Stamps as the sum of the times from sample to sample, where their unit is known.
+    /// Stamps as the sum of the times between samples, if their unit is known.
     pub(super) fn rule_of_steps(&self) -> Option<StampRule> {
         let place = (0..self.fields.len()).find(|place| self.is_steps(*place))?;
         let field = &self.fields[place];
@@ -201,7 +201,7 @@ impl Sources<'_> {
         }
     }
 
-    /// Whole seconds in one column and the parts of them in another, as ROS has them: `sec` beside `nanosec`.
+    /// Whole seconds in one column and their fraction in another, as in ROS: `sec` and `nanosec`.
     fn rule_of_two(&self, group: &Group) -> Option<StampRule> {
         let place = *group.times.iter().find(|p| self.parts_of(**p).is_some())?;
         let parts = self.parts_of(place)?;
@@ -220,7 +220,7 @@ impl Sources<'_> {
         .filter(|_| is_there)
     }
 
-    /// The parts of the whole seconds that a column holds, in the column beside it.
+    /// The fraction of a column of whole seconds, in the adjacent column.
     pub(super) fn parts_of(&self, place: usize) -> Option<Parts> {
         let seconds_of_name = |place: usize| {
             let field = self.fields.get(place)?;
@@ -249,7 +249,7 @@ impl Sources<'_> {
             (is_filled && !self.is_clock(beside) && numbers(beside).iter().all(is_part))
                 .then_some(parts)
         })?;
-        // A pair of two other times would not rise.
+        // A pair of two unrelated times would not rise.
         let rule = StampRule {
             parts: Some(known),
             ..StampRule::of_seconds("", place)
@@ -280,7 +280,8 @@ impl Sources<'_> {
         }))
     }
 
-    /// Seconds per unit of a column of stamps, and what was assumed; `None` if it only counts.
+    /// Seconds per unit of a column of stamps, and the assumption made; `None` if it is only an
+    /// index.
     fn seconds_per_unit(
         &self,
         place: usize,
@@ -324,8 +325,8 @@ impl Sources<'_> {
         Ok(Some(self.seconds_by_size(place)))
     }
 
-    /// Seconds per unit of a column of stamps by how large they are, or what is usual, and what was
-    /// assumed.
+    /// Seconds per unit of a column of stamps by their magnitude or convention, and the assumption
+    /// made.
     fn seconds_by_size(&self, place: usize) -> (f64, Option<String>) {
         let (field, values) = (&self.fields[place], &self.columns[place].values);
         let first = match self.kinds[place] {
@@ -353,8 +354,8 @@ impl Sources<'_> {
     }
 }
 
-/// Nanoseconds of a time in units of so many seconds, counted from 1970 where it counts 100 ns since 1601, and from the
-/// first where it is beyond all dates.
+/// Origin in ns of a time in units of `seconds_per_unit`: 1970 if it counts 100 ns since 1601, and the first value if
+/// it is beyond all dates.
 fn origin_ns(origin: i64, seconds_per_unit: f64) -> i64 {
     const FROM_1601_TO_1970: i128 = 11_644_473_600_000_000_000;
     let ns = i128::from(origin) * (seconds_per_unit * 1e9).round() as i128;
@@ -368,7 +369,7 @@ fn origin_ns(origin: i64, seconds_per_unit: f64) -> i64 {
     i64::try_from(ns).unwrap_or(0)
 }
 
-/// What a unit of time is called in messages.
+/// Name of a unit of time in messages.
 fn name_of_unit(seconds: f64) -> &'static str {
     const UNITS: [(f64, &str); 7] = [
         (1.0, "s"),
@@ -383,15 +384,15 @@ fn name_of_unit(seconds: f64) -> &'static str {
     known.map_or("units", |(_, name)| *name)
 }
 
-/// Seconds per unit of time stamps whose steps are those of a rate.
+/// Seconds per unit of time stamps whose steps match a rate.
 pub(super) fn seconds_of_step(step: f64, hz: f64) -> Option<f64> {
     [1.0, 1e-3, 1e-6, 1e-9, 60.0, 3600.0]
         .into_iter()
         .find(|factor| (step * factor * hz - 1.0).abs() < SAME)
 }
 
-/// Seconds per unit of a time since 1970 (between 2001 and 2286), or since 1601 in units of 100 ns, by
-/// its size alone.
+/// Seconds per unit of a time since 1970 (between 2001 and 2286), or since 1601 in units of 100 ns,
+/// from its magnitude alone.
 fn epoch_unit(first: f64) -> Option<f64> {
     match first {
         v if (1e9..1e10).contains(&v) => Some(1.0),
@@ -403,8 +404,8 @@ fn epoch_unit(first: f64) -> Option<f64> {
     }
 }
 
-/// Whether a column holds dates as spreadsheets count them, in days since the end of 1899: between 1970
-/// and 2100, under a name that speaks of a date.
+/// Whether a column contains spreadsheet dates in days since the end of 1899: between 1970 and 2100,
+/// under a name that refers to a date.
 fn is_spreadsheet_date(name: &str, values: &[f64]) -> bool {
     let name = name.to_lowercase();
     let is_date = ["date", "datum", "日付", "日時"]
@@ -416,8 +417,8 @@ fn is_spreadsheet_date(name: &str, values: &[f64]) -> bool {
             .all(|value| (25_569.0..73_051.0).contains(value))
 }
 
-/// Whether values are dates in days, of spreadsheets (1982 to 2064) or since the year 0 (1971 to 2080): their
-/// steps are below 2 s then, and would be below 20 µs were they seconds.
+/// Whether values are dates in days, of spreadsheets (1982 to 2064) or since year 0 (1971 to 2080): their
+/// steps are then below 2 s, and would be below 20 µs if they were seconds.
 fn are_days(values: &[f64]) -> bool {
     let is_date = |value: &f64| {
         (30_000.0..60_000.0).contains(value) || (720_000.0..760_000.0).contains(value)
@@ -427,7 +428,7 @@ fn are_days(values: &[f64]) -> bool {
         && typical_step(values).is_some_and(|step| step < 2e-5)
 }
 
-/// Whether parts fall, and only where the seconds go on.
+/// Whether the fractions fall only where the seconds advance.
 fn begin_anew(parts: &[f64], seconds: &[f64]) -> bool {
     let pairs = parts.windows(2).zip(seconds.windows(2));
     let mut falls = pairs.filter(|(part, _)| part[1] < part[0]).peekable();
@@ -436,6 +437,6 @@ fn begin_anew(parts: &[f64], seconds: &[f64]) -> bool {
 
 fn rises(values: &[f64]) -> bool {
     let rising = values.windows(2).filter(|pair| pair[1] >= pair[0]).count();
-    // A clock that was set back once does not make a column another one.
+    // A clock that was set back once remains a clock.
     100 * rising >= 99 * values.len().saturating_sub(1)
 }

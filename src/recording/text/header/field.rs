@@ -1,26 +1,26 @@
-//! A column as its headings describe it.
+//! A column as described by its headings.
 
 use crate::recording::choice::Label;
 use crate::recording::text::units::{self, Heading};
 use crate::unit::NamedUnit;
 
-/// A column as its headings describe it.
+/// A column as described by its headings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
     /// Its heading as written, or `column N`.
     pub heading: String,
     /// Its name without the unit.
     pub name: String,
-    /// Its unit, if it is known.
+    /// Its unit, if known.
     pub unit: Option<NamedUnit>,
     /// Its unit as written.
     pub unit_text: Option<String>,
-    /// Whether the cells above it name the rows of the header: it holds the time of the columns that
-    /// follow, if it holds anything.
+    /// Whether the cells above it name the rows of the header: it then contains the time of the
+    /// columns that follow, if anything.
     pub is_label: bool,
 }
 
-/// A unit, of time as well where a maker writes seconds as S.
+/// A unit, also of time for makers who write seconds as S.
 fn unit_of(name: &str, unit: &str) -> Option<NamedUnit> {
     match unit.trim() {
         "S" if units::is_time_name(name) || units::is_axis_name(name) => units::read("s"),
@@ -40,7 +40,7 @@ pub(super) fn without_name<'a>(unit: &'a str, name: &str) -> &'a str {
 }
 
 impl Field {
-    /// A column without a heading, its place counted from 0.
+    /// A column without a heading, with its index from 0.
     #[must_use]
     pub fn unnamed(place: usize) -> Self {
         let name = format!("column {}", place + 1);
@@ -53,7 +53,7 @@ impl Field {
         }
     }
 
-    /// A column with a heading, and with a unit in a row of its own.
+    /// A column with a heading, and a unit in a separate row.
     #[must_use]
     pub fn new(heading: &str, unit: Option<&str>) -> Self {
         let unquoted = heading.replace('"', "");
@@ -65,8 +65,8 @@ impl Field {
         } = units::heading(heading);
         let below = unit.and_then(|unit| unit_of(&name, unit));
         let below_text = unit.and_then(units::as_written);
-        // Under a name with a unit below, what looks like a unit at its end may be none, unless it
-        // stands in brackets and is the same one.
+        // With a unit below the name, an apparent unit at its end may not be one, unless it is in
+        // brackets and the same.
         let is_plain = !heading.contains(['[', '(', '/']);
         let is_own = |own: &NamedUnit| match &below {
             Some(below) => !is_plain && own.unit == below.unit,
@@ -89,7 +89,7 @@ impl Field {
         }
     }
 
-    /// A column whose heading is its name alone.
+    /// A column whose heading is only a name.
     #[must_use]
     pub fn with_unit(name: &str, unit: Option<&str>) -> Self {
         let unit = unit.map(|unit| without_name(unit, name));
@@ -102,7 +102,7 @@ impl Field {
         }
     }
 
-    /// What it goes by.
+    /// Its identification for selection.
     pub(crate) fn label(&self) -> Label<'_> {
         Label {
             heading: &self.heading,
@@ -111,13 +111,13 @@ impl Field {
         }
     }
 
-    /// Whether it is known to hold time, by its unit.
+    /// Whether its unit is a unit of time.
     #[must_use]
     pub fn has_time_unit(&self) -> bool {
         self.unit.as_ref().is_some_and(units::is_time)
     }
 
-    /// Whether its name is that of time, or can be and has a unit of time: `T1 [s]`, `X [s]`.
+    /// Whether it is named like time, or has an axis name with a unit of time: `T1 [s]`, `X [s]`.
     #[must_use]
     pub fn is_named_time(&self) -> bool {
         let can_be = || units::is_axis_name(&self.name) || units::is_weak_time_name(&self.name);

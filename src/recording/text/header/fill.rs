@@ -1,4 +1,4 @@
-//! Names and units out of keys and values above a table.
+//! Names and units from keys and values above a table.
 
 use super::Row;
 use super::field::{Field, without_name};
@@ -6,7 +6,7 @@ use super::labelled::is_name_label;
 use crate::recording::text::keys::{Entry, Topic, topic};
 use crate::recording::text::units;
 
-/// Names out of a line such as `Source,CH1`, where no line above the table has them.
+/// Names from a line such as `Source,CH1`, if no line above the table has them.
 pub(super) fn fill_names(fields: &mut [Field], entries: &[Entry], used: &[bool]) {
     let places: Vec<usize> = (0..fields.len()).filter(|place| used[*place]).collect();
     let about = entries
@@ -28,7 +28,7 @@ pub(super) fn fill_names(fields: &mut [Field], entries: &[Entry], used: &[bool])
     }
 }
 
-/// Units out of lines such as `Vertical Units,V,V`: one for each column, or one for all.
+/// Units from lines such as `Vertical Units,V,V`: one per column, or one for all.
 pub(super) fn fill_units(fields: &mut [Field], entries: &[Entry], used: &[bool]) {
     let signals: Vec<usize> = (0..fields.len())
         .filter(|place| used[*place])
@@ -55,7 +55,7 @@ pub(super) fn fill_units(fields: &mut [Field], entries: &[Entry], used: &[bool])
             let text = match values.as_slice() {
                 [one] => one,
                 several if several.len() == signals.len() => several[rank],
-                // One above each column, where the key stands above the time.
+                // One above each column, where the key is above the time.
                 _ if entry.values.len() + 1 == fields.len() && *place > 0 => {
                     above(&entry.values, fields, *place)
                 }
@@ -66,7 +66,7 @@ pub(super) fn fill_units(fields: &mut [Field], entries: &[Entry], used: &[bool])
     }
 }
 
-/// What a value says of each channel, `CH1:V CH2:A`, or the value as it is.
+/// Values for each channel, `CH1:V CH2:A`, or the value as it is.
 fn of_channels(value: &str) -> Vec<&str> {
     let parts: Vec<&str> = value.split_whitespace().collect();
     let is_of_channel = |part: &&str| {
@@ -80,7 +80,7 @@ fn of_channels(value: &str) -> Vec<&str> {
     }
 }
 
-/// The unit of the horizontal axis out of a line such as `Horizontal Units,s`.
+/// The unit of the horizontal axis from a line such as `Horizontal Units,s`.
 pub(super) fn fill_axis_unit(fields: &mut [Field], entries: &[Entry]) {
     let entry = entries
         .iter()
@@ -95,7 +95,7 @@ pub(super) fn fill_axis_unit(fields: &mut [Field], entries: &[Entry]) {
     }
 }
 
-/// The unit of a first column whose heading is nothing but a unit of time, as `min`.
+/// The unit of a first column whose heading is only a unit of time, such as `min`.
 pub(super) fn fill_time_unit(fields: &mut [Field]) {
     if let [first, _, ..] = fields
         && first.unit_text.is_none()
@@ -106,8 +106,8 @@ pub(super) fn fill_time_unit(fields: &mut [Field]) {
     }
 }
 
-/// What stands above a column, or above the one before it of which this is another sight: `CH1 Peak
-/// Detect` after `CH1`.
+/// The value above a column, or above the preceding one of which this is another view:
+/// `CH1 Peak Detect` after `CH1`.
 fn above<'a>(values: &'a [String], fields: &[Field], place: usize) -> &'a str {
     let own = values[place - 1].as_str();
     let is_of_before = place > 1 && fields[place].name.starts_with(&fields[place - 1].name);
@@ -117,7 +117,7 @@ fn above<'a>(values: &'a [String], fields: &[Field], place: usize) -> &'a str {
     }
 }
 
-/// Units, and the rate if it is the same for all, out of a list of the channels such as
+/// Units, and the rate if it is common to all, from a list of channels such as
 /// `Channel,Unit,Length,Increment` above `Force,N,300,0.001`.
 pub(super) fn fill_from_list(fields: &mut [Field], rows: &[Row]) -> Vec<Entry> {
     let is_heading = |row: &Row| {

@@ -1,4 +1,4 @@
-//! Rows above a table that are keys with values, not headings.
+//! Detection of rows above a table that are keys with values rather than headings.
 
 use super::positional::is_units;
 use super::{Field, Row, after_definition};
@@ -17,7 +17,7 @@ pub(super) fn repeats_a_key(cells: &[String]) -> bool {
     first.is_some() && keys.clone().count() > 0 && keys.all(|key| key == first)
 }
 
-/// Rows of a key and a value each above a table of two columns are no headings.
+/// Rows of one key and value each above a table of two columns are not headings.
 pub(super) fn is_key_block(fitting: &[&Row], used: &[bool]) -> bool {
     let two = used.iter().filter(|used| **used).count() == 2;
     let Some(nearest) = fitting.first() else {
@@ -46,12 +46,12 @@ pub(super) fn is_key_block(fitting: &[&Row], used: &[bool]) -> bool {
     let is_known = topic.is_some_and(is_of_axis) && values.iter().any(is_value)
         || topic.is_some_and(|topic| !is_of_axis(topic))
             && values.iter().all(|v| units::read(v).is_none());
-    // An empty line parts headings from keys.
+    // An empty line separates headings from keys.
     let in_block = fitting.len() > 2 && fitting[1].line + 1 == nearest.line;
     two && !is_time && !is_units(&nearest.cells) && (in_block || is_known)
 }
 
-/// Whether a topic is one of rates and units, which is said in no heading.
+/// Whether a topic concerns rates or units, which never are headings.
 fn is_of_axis(topic: Topic) -> bool {
     !matches!(topic, Topic::Date | Topic::Name)
 }
@@ -66,7 +66,7 @@ pub(super) fn is_key_with_values(cells: &[String]) -> bool {
     keys::topic(key).is_some_and(is_of_axis) && filled.peek().is_some() && filled.all(is_quantity)
 }
 
-/// Whether cells are a key and what was measured on each channel: `Period:,T=1.000mS,T=?` or
+/// Whether cells are a key and a measured quantity for each channel: `Period:,T=1.000mS,T=?` or
 /// `Vpp,3.2V,?`.
 pub(super) fn is_list_of_quantities(cells: &[String]) -> bool {
     let mut filled = cells.iter().filter(|cell| !cell.is_empty());
@@ -94,7 +94,7 @@ pub(super) fn is_list_of_quantities(cells: &[String]) -> bool {
         || quantities > 0 && quantities + unknown == values.len()
 }
 
-/// Whether a text is a unit, in capitals perhaps: `KHz`, `mS`.
+/// Whether a text is a unit, possibly in capitals: `KHz`, `mS`.
 fn is_unit_or_rate(text: &str) -> bool {
     let lower = text.to_lowercase();
     units::read(text).is_some() || units::read(&lower).is_some() || lower.ends_with("hz")

@@ -17,8 +17,8 @@ pub(super) fn is_name_label(cell: &str) -> bool {
     has("names of rows", &cell)
 }
 
-/// A header whose rows are labelled in the first column (and again above every further column of
-/// time): the columns, and the line of the names.
+/// A header with row labels in the first column (repeated above every further time column): the
+/// columns, and the line of the names.
 pub(super) fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize)> {
     let names = rows
         .iter()
@@ -38,7 +38,7 @@ pub(super) fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize
             .iter()
             .find(|row| keys::topic(&key(row)) == Some(topic))
     };
-    // Headings right above the data that begin with the time are better names.
+    // Headings just above the data that begin with the time are better names.
     let has_headings = rows.last().is_some_and(|last| {
         last.line > names.line && last.cells.len() >= used.len() && is_headings(&last.cells)
     });
@@ -49,14 +49,14 @@ pub(super) fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize
     let units = about(Topic::Unit)
         .copied()
         .filter(|row| row.cells.len() >= named);
-    // Without a row that says more, the label must stand above several columns.
+    // Without a further informative row, the label must be above several columns.
     let is_alone = others.is_empty()
         || units.is_none() && about(Topic::Interval).is_none() && about(Topic::Rate).is_none();
     let is_repeated = names.cells[1..].iter().any(|cell| *cell == names.cells[0]);
     if is_alone && !is_repeated && !is_last_and_apart(rows, names.line) {
         return None;
     }
-    // Second,Volt right above the data.
+    // Second,Volt just above the data.
     let under = rows
         .last()
         .filter(|last| last.line > names.line && is_nothing_but_units(&last.cells));
@@ -67,8 +67,8 @@ pub(super) fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize
     Some((fields, names.line))
 }
 
-/// Whether a line is the last above the data, and an empty one parts it from what is above: no key
-/// among others.
+/// Whether a line is the last above the data and separated from the rest by an empty one, so that
+/// it is not a key among others.
 fn is_last_and_apart(rows: &[Row], line: usize) -> bool {
     let [.., above, last] = rows else {
         return false;
@@ -76,7 +76,7 @@ fn is_last_and_apart(rows: &[Row], line: usize) -> bool {
     last.line == line && above.line + 1 < line
 }
 
-/// Whether cells are the name of time and names of channels: no key with values, no units.
+/// Whether cells are a time name and channel names, rather than a key with values or units.
 fn is_headings(cells: &[String]) -> bool {
     let is_name = |cell: &String| {
         !cell.is_empty() && units::read(cell).is_none() && keys::quantity(cell, b'.').is_none()
@@ -87,7 +87,7 @@ fn is_headings(cells: &[String]) -> bool {
         && cells[1..].iter().all(is_name)
 }
 
-/// Whether most columns have a cell, none of which stands between a key and its value.
+/// Whether most columns have a cell, none of them between a key and its value.
 fn is_wide(row: &Row, columns: usize) -> bool {
     let filled = row.cells.iter().filter(|cell| !cell.is_empty()).count();
     row.cells.len() >= columns
@@ -96,7 +96,7 @@ fn is_wide(row: &Row, columns: usize) -> bool {
         && !row.cells.iter().any(|cell| cell == ":" || cell == "=")
 }
 
-/// Whether the rows of data have no cell under the labels, so that the names begin one cell later.
+/// Whether the data rows have no cell under the labels, so that the names begin one cell later.
 fn is_beside_data(names: &Row, used: &[bool]) -> bool {
     let filled = names.cells.iter().filter(|cell| !cell.is_empty()).count();
     filled == used.len() + 1 && names.cells.len() >= filled && used.iter().all(|used| *used)
@@ -115,7 +115,7 @@ fn fields_beside(names: &Row, units: Option<&Row>, columns: usize) -> Vec<Field>
         .collect()
 }
 
-/// Columns under their names. `under` are units right above the data, if there are any.
+/// Columns under their names. `under` are units just above the data, if any.
 fn fields_below(
     names: &Row,
     units: Option<&Row>,
@@ -130,14 +130,14 @@ fn fields_below(
                 .iter()
                 .all(|row| repeats(row) || row.cells.len() <= place)
     };
-    // The values of each channel may stand under the labels, and nothing under the names.
+    // The values of each channel may be under the labels, with nothing under the names.
     let shifts = |place: usize| {
         let columns = used.iter().enumerate().filter(|(_, used)| **used);
         columns.clone().count() > 0 && columns.clone().all(|(place, _)| is_label(place)) && {
             !used.get(place + 1).copied().unwrap_or(false)
         }
     };
-    // The first column may have a heading of its own below: `Time [ms]`.
+    // The first column may have its own heading below: `Time [ms]`.
     let is_heading = |row: &&&Row| row.cells[1..].iter().all(String::is_empty);
     let time = others
         .iter()
@@ -167,7 +167,7 @@ fn fields_below(
     (0..used.len()).map(field).collect()
 }
 
-/// The lines around one that no empty line parts from it.
+/// The lines adjacent to one without an empty line between.
 fn block_around(rows: &[Row], line: usize) -> std::ops::RangeInclusive<usize> {
     let (mut first, mut last) = (line, line);
     for row in rows {

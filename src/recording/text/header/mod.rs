@@ -1,4 +1,4 @@
-//! What the lines above a table say of its columns.
+//! Column information from the lines above a table.
 
 mod field;
 mod fill;
@@ -27,7 +27,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// Gives the channels without a unit the one that a maker's files never name.
+    /// Gives channels without a unit the maker's default unit.
     pub fn set_default_units(&mut self, unit: &str) {
         for field in &mut self.fields {
             let is_other = field.unit_text.is_some()
@@ -42,14 +42,14 @@ impl Header {
     }
 }
 
-/// A line above the table, split.
+/// A line above the table, split into cells.
 struct Row<'a> {
     line: usize,
     text: &'a str,
     cells: Vec<String>,
 }
 
-/// Reads the lines above a table; `used` says which columns have data in the first rows.
+/// Parses the lines above a table; `used` marks the columns with data in the first rows.
 #[must_use]
 pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
     let rows: Vec<Row> = head.lines[..table.first]
@@ -67,7 +67,7 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
         .collect();
     let entries = |without: &[usize]| -> Vec<Entry> {
         rows.iter()
-            // `CH1V,CH2V,t0 =-5e-05, tInc = 1e-09,` names columns and says more.
+            // `CH1V,CH2V,t0 =-5e-05, tInc = 1e-09,` names columns and contains further entries.
             .filter(|row| !without.contains(&row.line) || row.text.contains('='))
             .flat_map(|row| keys::entries(head.number(row.line), row.text, table.dialect))
             .collect()
@@ -80,7 +80,8 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
     };
     if let Some((mut fields, names)) = labelled(&rows, used) {
         let entries = entries(&[names]);
-        // Beside labels, the unit of the axis may be that of the picture: the rate tells the one of the time.
+        // Next to labels, the unit of the axis may refer to the picture: the rate determines the unit of
+        // time.
         fill_units(&mut fields, &entries, used);
         return Header {
             fields,
@@ -105,7 +106,7 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
     }
 }
 
-/// Keys in a line of their own with their values in the next: `dt:` above `0.001`, `*RATE` above `500 Hz`.
+/// Keys in one line with their values in the next: `dt:` above `0.001`, `*RATE` above `500 Hz`.
 fn entries_below_keys(head: &Head, rows: &[Row]) -> Vec<Entry> {
     rows.windows(2)
         .filter(|pair| pair[1].line == pair[0].line + 1)
@@ -122,7 +123,7 @@ fn entries_below_keys(head: &Head, rows: &[Row]) -> Vec<Entry> {
         .collect()
 }
 
-/// Whether a key is about the time axis.
+/// Whether a key concerns the time axis.
 fn is_about_axis(key: &str) -> bool {
     use keys::Topic::{Count, Date, Interval, Rate, Start};
     matches!(
@@ -131,11 +132,11 @@ fn is_about_axis(key: &str) -> bool {
     )
 }
 
-/// Longest heading of a lone column, in words.
+/// Maximum number of words in the heading of a single column.
 const WORDS: usize = 4;
 
-/// The heading of the only column of a table, if a line right above it may be that: words, none of them a number or a
-/// key. Spaces would part it, where there is nothing else to part.
+/// The heading of the only column of a table, if a line just above it qualifies: words, none of them a number or a
+/// key. With space separators it would be split otherwise.
 fn lone_heading(head: &Head, table: &Table, line: usize) -> Option<String> {
     let is_alone = table.width == 1 && table.dialect.delimiter == Delimiter::Spaces;
     let between = &head.lines[line + 1..table.first];
@@ -153,8 +154,8 @@ fn lone_heading(head: &Head, table: &Table, line: usize) -> Option<String> {
     is_heading.then(|| text.to_owned())
 }
 
-/// Splits a line above the table as the table is split, or, if that does not give a cell for each
-/// column, by other marks that do.
+/// Splits a line above the table like the table, or by other separators if only these give a cell
+/// for each column.
 fn split(text: &str, table: &Table, used: &[bool]) -> Vec<String> {
     let text = uncommented(text);
     let cells = table.dialect.cells(text);
@@ -195,7 +196,7 @@ fn split(text: &str, table: &Table, used: &[bool]) -> Vec<String> {
         .unwrap_or(cells)
 }
 
-/// Headings of three cells each, `"Zeit";"t";"s"`: name, symbol and unit as one.
+/// Headings of three cells each, `"Zeit";"t";"s"`: name, symbol and unit, combined.
 fn in_threes(cells: &[String], width: usize) -> Option<Vec<String>> {
     let is_unit = |three: &[String]| units::read(&three[2]).is_some();
     let fits = cells.len() == 3 * width && cells.chunks(3).all(is_unit);
@@ -203,7 +204,7 @@ fn in_threes(cells: &[String], width: usize) -> Option<Vec<String>> {
     fits.then(|| cells.chunks(3).map(joined).collect())
 }
 
-/// Headings that begin with a name in quotes each: `"Zeit" t / s "Drehmoment" M / Nm`.
+/// Headings that each begin with a quoted name: `"Zeit" t / s "Drehmoment" M / Nm`.
 fn at_quotes(text: &str) -> Vec<String> {
     let opening = text.match_indices('"').step_by(2).map(|(place, _)| place);
     let mut starts: Vec<usize> = opening.collect();
@@ -214,17 +215,17 @@ fn at_quotes(text: &str) -> Vec<String> {
         .collect()
 }
 
-/// Headings may stand in a comment: `# time_s,bridge_V`.
+/// Headings may be in a comment: `# time_s,bridge_V`.
 fn uncommented(text: &str) -> &str {
     let text = text.trim_start_matches('\u{feff}');
     match text.trim_start().strip_prefix(['#', '%', '!']) {
         Some(rest) => rest.trim_start_matches(['#', '%', '!']).trim_start(),
-        // CASSY heads its columns so.
+        // Column headings of CASSY.
         None => after_definition(text).unwrap_or(text),
     }
 }
 
-/// What follows `DEF=`, with or without spaces around the mark.
+/// The text after `DEF=`, with or without spaces around the sign.
 pub(super) fn after_definition(text: &str) -> Option<&str> {
     let rest = text.trim_start().strip_prefix("DEF")?;
     Some(rest.trim_start().strip_prefix('=')?.trim_start_matches(' '))

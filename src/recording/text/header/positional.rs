@@ -1,4 +1,4 @@
-//! Columns named by the rows nearest above the data.
+//! Columns named by the closest rows above the data.
 
 use std::collections::HashSet;
 
@@ -10,10 +10,10 @@ use crate::recording::text::head::Table;
 use crate::recording::text::units;
 use crate::unit::NamedUnit;
 
-/// Lines above a table among which its headings are looked for.
+/// Number of lines above a table that are searched for its headings.
 const LINES_FOR_HEADINGS: usize = 10;
 
-/// Columns named by the rows nearest above the data, and which lines those are.
+/// Columns named by the closest rows above the data, and the numbers of those lines.
 pub(super) struct Positional {
     pub(super) fields: Vec<Field>,
     pub(super) lines: Vec<usize>,
@@ -57,8 +57,8 @@ pub(super) fn positional(rows: &[Row], table: &Table, used: &[bool]) -> Position
     }
 }
 
-/// A column with the unit that stands beside its name in the row above the names, as that of
-/// `INTERVAL` below `INTERVAL[us]`.
+/// A column with the unit next to its name in the row above the names, as for `INTERVAL` below
+/// `INTERVAL[us]`.
 fn with_unit_above(mut field: Field, above: Option<&str>) -> Field {
     let above = above.map(|above| Field::new(above, None));
     if let Some(above) = above.filter(|above| above.name == field.name)
@@ -79,18 +79,18 @@ impl Positional {
     }
 }
 
-/// The rows above the data by what is in them.
+/// The rows above the data by content.
 struct Headings<'a> {
     names: &'a Row<'a>,
     units: Option<&'a Row<'a>>,
-    /// The row of units, where it holds remarks besides.
+    /// The row of units, if it contains remarks as well.
     remarks: Option<&'a Row<'a>>,
-    /// Short names between the names and their units.
+    /// Short symbols between the names and their units.
     symbols: Option<&'a Row<'a>>,
 }
 
 impl<'a> Headings<'a> {
-    /// From the rows that fit, the lowest first.
+    /// From the matching rows, lowest first.
     fn of(fitting: &[&'a Row<'a>]) -> Option<Self> {
         let fitting = above_remarks(fitting);
         let (names, units, remarks) = match fitting {
@@ -114,7 +114,7 @@ impl<'a> Headings<'a> {
         })
     }
 
-    /// A column; `upper` tells columns of the same name apart.
+    /// A column; `upper` distinguishes columns of the same name.
     fn field(&self, place: usize, upper: Option<&Row>) -> Field {
         let Some(name) = filled(Some(self.names), place) else {
             return Field::unnamed(place);
@@ -137,8 +137,8 @@ impl<'a> Headings<'a> {
     }
 }
 
-/// The rows from those on that name time above its unit, where they stand above rows of other kinds:
-/// `Time,Force` and `s,N` above the names of devices or of their inputs.
+/// The rows starting with those that have time above its unit, if they are above rows of other
+/// kinds: `Time,Force` and `s,N` above the names of devices or their inputs.
 fn above_remarks<'a, 'b>(fitting: &'b [&'a Row<'a>]) -> &'b [&'a Row<'a>] {
     let is_time_above_unit = |pair: &[&Row]| {
         let (below, above) = (pair[0], pair[1]);
@@ -161,13 +161,13 @@ fn above_remarks<'a, 'b>(fitting: &'b [&'a Row<'a>]) -> &'b [&'a Row<'a>] {
     }
 }
 
-/// The text of a cell that has one.
+/// The text of a nonempty cell.
 fn filled<'a>(row: Option<&'a Row>, place: usize) -> Option<&'a str> {
     let cell = row?.cells.get(place)?;
     (!cell.is_empty()).then_some(cell.as_str())
 }
 
-/// Whether a row holds the symbols of the names right above it: `t`, `F` below `Time`, `Force`.
+/// Whether a row contains the symbols of the names just above it: `t`, `F` below `Time`, `Force`.
 fn is_symbols_of(symbols: &Row, names: &Row) -> bool {
     let is_name = |name: &String, symbol: &String| {
         symbol.chars().count() <= 3 && name.chars().count() > symbol.chars().count()
@@ -182,8 +182,8 @@ fn is_symbols_of(symbols: &Row, names: &Row) -> bool {
             .all(|(name, symbol)| is_name(name, symbol) || name == symbol)
 }
 
-/// Whether cells can be headings: one for (nearly) each column with data, and no numbers but those
-/// of channels after a text.
+/// Whether cells can be headings: one for (nearly) each column with data, and no numbers except
+/// channel numbers after a text.
 fn is_heading(cells: &[String], table: &Table, used: &[bool]) -> bool {
     let places: Vec<usize> = (0..used.len()).filter(|place| used[*place]).collect();
     let filled = places
@@ -202,7 +202,7 @@ fn is_heading(cells: &[String], table: &Table, used: &[bool]) -> bool {
         filled == places.len()
             || places.len() > 2 && filled + 1 >= places.len() && last_is_there
             || is_units_with_gaps(cells)
-            // A column that counts often has no heading.
+            // An index column often has no heading.
             || cells.len() == 2 && filled == 1 && cells[0].is_empty()
             || places.len() > 5 && 10 * filled >= 7 * places.len()
     };
@@ -221,7 +221,7 @@ fn is_heading(cells: &[String], table: &Table, used: &[bool]) -> bool {
     })
 }
 
-/// Whether a row under the names of columns holds their units beside words that it repeats: `NO.`,
+/// Whether a row under column names contains their units next to words that it repeats: `NO.`,
 /// `Time`, `ms`, `V`, `N` under `Number`, `Time`, `ms`, `CH1`, `CH2`.
 fn is_units_under(below: &Row, above: &Row) -> bool {
     let pairs = || below.cells.iter().zip(&above.cells);
@@ -240,7 +240,7 @@ fn is_units_under(below: &Row, above: &Row) -> bool {
         && 2 * new.iter().filter(like).count() >= new.len()
 }
 
-/// Whether cells are units, or nothing where a channel has none: `s,Nm,,`.
+/// Whether cells are units, or empty for channels without one: `s,Nm,,`.
 fn is_units_with_gaps(cells: &[String]) -> bool {
     let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
     let has_gap = cells.iter().any(String::is_empty);
@@ -250,7 +250,7 @@ fn is_units_with_gaps(cells: &[String]) -> bool {
         && filled.all(|cell| NamedUnit::parse(cell).is_some())
 }
 
-/// Whether cells are units: all of them, or some where others repeat, or most are in brackets.
+/// Whether cells are units: all of them, or some if others repeat, or most are in brackets.
 pub(super) fn is_units(cells: &[String]) -> bool {
     let filled: Vec<&String> = cells.iter().filter(|cell| !cell.is_empty()).collect();
     let known = filled
@@ -273,7 +273,7 @@ pub(super) fn is_units(cells: &[String]) -> bool {
     known > 0 && (repeats || 2 * like > filled.len()) || bracketed > 0 && bracketed == filled.len()
 }
 
-/// Whether a lone line above the data names its columns by their units: `s,V`.
+/// Whether a single line above the data names its columns by their units: `s,V`.
 pub(super) fn is_nothing_but_units(cells: &[String]) -> bool {
     let mut filled = cells.iter().filter(|cell| !cell.is_empty()).peekable();
     filled.peek().is_some() && filled.all(|cell| NamedUnit::parse(cell).is_some())
@@ -296,8 +296,8 @@ fn is_mixed(below: &[String], above: &[String]) -> bool {
             .any(|cell| units::as_written(cell).is_some_and(|c| c.len() > 3))
 }
 
-/// Rows under the units that say how values were formed, `Avg`, `Smp`, or as what they are stored,
-/// `Double`, `REAL32`.
+/// Rows under the units with the kind of value, `Avg`, `Smp`, or the storage type, `Double`,
+/// `REAL32`.
 fn is_process_row(cells: &[String]) -> bool {
     const WORDS: [&str; 14] = [
         "avg", "smp", "max", "min", "std", "tot", "raw", "actual", "scaled", "sample", "mean",
@@ -322,7 +322,7 @@ fn is_process_row(cells: &[String]) -> bool {
     !filled.is_empty() && (is_process || filled.iter().all(|cell| is_type(cell)))
 }
 
-/// Whether a row counts the channels that its cells are about: `Channel Data`, `CH 1`, `CH 2`.
+/// Whether a row numbers the channels of its cells: `Channel Data`, `CH 1`, `CH 2`.
 fn is_of_channels(row: &Row) -> bool {
     let counts = |cell: &String| cell.ends_with(|c: char| c.is_ascii_digit());
     row.cells.len() > 1 && row.cells[1..].iter().all(counts)
@@ -333,7 +333,8 @@ fn all_differ<'a>(cells: impl IntoIterator<Item = &'a String>) -> bool {
     cells.into_iter().all(|cell| seen.insert(cell))
 }
 
-/// A row above the names that tells columns of the same name apart: `CH 1`, `CH 2` above `Voltage`.
+/// A row above the names that distinguishes columns of the same name: `CH 1`, `CH 2` above
+/// `Voltage`.
 fn upper_names<'a>(names: &Row, fitting: &[&'a Row<'a>], used: &[bool]) -> Option<&'a Row<'a>> {
     let cells = |row: &Row| -> Vec<String> {
         (1..used.len())

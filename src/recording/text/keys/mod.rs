@@ -1,4 +1,4 @@
-//! What the lines above a table say, as keys with values: rate, start, date, number of samples.
+//! Keys and values in the lines above a table: rate, start, date, number of samples.
 
 mod values;
 mod words;
@@ -14,14 +14,14 @@ pub struct Entry {
     pub line: usize,
     /// The key, without colon, equals sign and quotes.
     pub key: String,
-    /// Cells after it, as many as there are, empty ones too.
+    /// Cells after it, including empty ones.
     pub values: Vec<String>,
 }
 
-/// What a key is about.
+/// Topic of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Topic {
-    /// Samples a second.
+    /// Sampling rate.
     Rate,
     /// Time between samples.
     Interval,
@@ -40,7 +40,7 @@ pub enum Topic {
 }
 
 impl Topic {
-    /// By its name in the vocabulary.
+    /// From its name in the vocabulary.
     fn of(name: &str) -> Option<Self> {
         Some(match name {
             "rate" => Self::Rate,
@@ -57,13 +57,13 @@ impl Topic {
 }
 
 impl Entry {
-    /// What its key is about.
+    /// Topic of its key.
     #[must_use]
     pub fn topic(&self) -> Option<Topic> {
         topic(&self.key)
     }
 
-    /// Its first value that says anything.
+    /// Its first nonempty value.
     #[must_use]
     pub fn value(&self) -> Option<&str> {
         self.values
@@ -73,14 +73,14 @@ impl Entry {
     }
 }
 
-/// The entries of a line: one for its key and values, or one for each cell `key = value`.
+/// Entries of a line: one for its key and values, or one for each cell `key = value`.
 #[must_use]
 pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
     let text = text
         .trim()
         .trim_start_matches(['#', '%', '!', '*', ';', '/'])
         .trim();
-    // `Abtastrate = 2,5 kHz` is one value, whatever the table's mark.
+    // `Abtastrate = 2,5 kHz` is one value, whatever the table's separator.
     if let Some(entry) = one_cell(line, text).filter(is_quantity) {
         return vec![entry];
     }
@@ -88,7 +88,7 @@ pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
         return vec![entry];
     }
     let cells = split(text, dialect);
-    // `CH1V,CH2V,t0 =-5e-05, tInc = 1e-09,`: cells of their own.
+    // `CH1V,CH2V,t0 =-5e-05, tInc = 1e-09,`: separate cells.
     let assignments: Vec<Entry> = cells
         .iter()
         .filter_map(|cell| {
@@ -127,8 +127,8 @@ fn bare_rate(line: usize, text: &str, decimal: u8) -> Option<Entry> {
     entry(line, &unit, vec![value.to_owned()]).filter(|_| is_rate)
 }
 
-/// A key and its value parted by the first colon or equals sign, before a comma that is within the value
-/// as it does not part the cells of the table: `Date : 24.11.2011, 09:07:38`.
+/// A key and its value separated by the first colon or equals sign, before a comma that belongs to the
+/// value, as the table has another separator: `Date : 24.11.2011, 09:07:38`.
 fn before_comma(line: usize, text: &str, dialect: Dialect) -> Option<Entry> {
     let place = text.find([':', '='])?;
     let is_first = text.find(',').is_some_and(|comma| place < comma);
@@ -140,7 +140,7 @@ fn before_comma(line: usize, text: &str, dialect: Dialect) -> Option<Entry> {
     entry(line, &text[..place], vec![value.to_owned()]).filter(|_| !is_path)
 }
 
-/// Whether the value is a number with or without a unit, and nothing else.
+/// Whether the value is only a number, with or without a unit.
 fn is_quantity(entry: &Entry) -> bool {
     let Some(text) = entry.value() else {
         return false;
@@ -155,7 +155,7 @@ fn one_cell(line: usize, text: &str) -> Option<Entry> {
     let marks = ["=", ":", " - ", "\t"];
     let (key, value) = marks.iter().find_map(|mark| {
         let (key, value) = text.split_once(mark)?;
-        // A path is no key: C:\data\test.txt.
+        // A path is not a key: C:\data\test.txt.
         let is_path = *mark == ":" && (value.starts_with('\\') || value.starts_with('/'));
         (!is_path && !value.trim().is_empty()).then_some((key, value))
     })?;
@@ -197,7 +197,7 @@ fn entry(line: usize, key: &str, values: Vec<String>) -> Option<Entry> {
     })
 }
 
-/// Cells of a line above a table: its marks may differ from those of the table.
+/// Cells of a line above a table, whose separator may differ from that of the table.
 fn split(text: &str, dialect: Dialect) -> Vec<String> {
     let table = match dialect.delimiter {
         Delimiter::Byte(byte) => Some(byte),

@@ -83,7 +83,7 @@ fn a_comma_within_a_value_parts_nothing() {
     let found = read("Delta              : 0,001 sec.");
     assert_eq!(found[0].key, "Delta");
     assert_eq!(rate_hz(&found[0], None, b','), Some(1000.0));
-    // Cells of their own, and cells of the table.
+    // Separate cells, and cells of the table.
     assert_eq!(read("t0 = 5, tInc = 1e-09").len(), 2);
     assert_eq!(read("Date;24.11.2011, Thu").len(), 1);
     assert_eq!(entries(7, "Note: a,b", COMMA)[0].values, ["b"]);

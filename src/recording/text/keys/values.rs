@@ -1,4 +1,4 @@
-//! What values mean: rates, intervals, seconds, dates.
+//! Interpretation of values: rates, intervals, seconds, dates.
 
 use super::{Entry, Topic};
 use crate::recording::text::cell::Cell;
@@ -29,7 +29,7 @@ pub fn quantity(text: &str, decimal: u8) -> Option<(f64, String)> {
     Some((value, text[end..].trim().to_owned()))
 }
 
-/// Rates and how many Hz they are.
+/// Units of rate with their values in Hz.
 const RATES: [(&str, f64); 21] = [
     ("hz", 1.0),
     ("khz", 1e3),
@@ -54,7 +54,7 @@ const RATES: [(&str, f64); 21] = [
     ("samples/second", 1.0),
 ];
 
-/// Hertz of a rate or an interval, whichever the unit says; `default_unit` where it says nothing.
+/// Rate in Hz from a rate or an interval, depending on the unit; `default_unit` if there is none.
 fn hertz(value: f64, unit: &str, is_interval: bool) -> Option<f64> {
     let lower = unit
         .trim_end_matches(['.', ':', ';', ','])
@@ -80,7 +80,7 @@ fn hertz(value: f64, unit: &str, is_interval: bool) -> Option<f64> {
     Some(1.0 / (value * seconds)).filter(|hz| hz.is_finite() && *hz > 0.0)
 }
 
-/// Rate in Hz that an entry gives for a place among its values (the first that is filled without).
+/// Rate in Hz from an entry, at an index among its values (otherwise from the first nonempty one).
 #[must_use]
 pub fn rate_hz(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> {
     let is_interval = match entry.topic()? {
@@ -108,12 +108,11 @@ pub fn rate_hz(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> 
         return None;
     }
     let hz = hertz(value, unit, is_interval)?;
-    // A shorter decimal where the reciprocal of an interval is one but for rounding.
+    // A shorter decimal, if the reciprocal of an interval equals it within rounding.
     Some(crate::recording::without_rounding(hz)).filter(|hz| hz.is_finite())
 }
 
-/// The first of values that are given for each channel, `CH1:1.0E-06 CH2:1.0E-06`, or the value as
-/// it is.
+/// The first of values given per channel, `CH1:1.0E-06 CH2:1.0E-06`, or the value as it is.
 fn of_first_channel(value: &str) -> &str {
     let first = value.split_whitespace().next().unwrap_or_default();
     match first.split_once(':') {
@@ -122,7 +121,7 @@ fn of_first_channel(value: &str) -> &str {
     }
 }
 
-/// Seconds that an entry gives.
+/// Seconds given by an entry.
 #[must_use]
 pub fn seconds(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> {
     let text = match place {
@@ -154,7 +153,7 @@ fn in_brackets(text: &str) -> Option<&str> {
         })
 }
 
-/// Date and time of the record as the entries give them.
+/// Date and time of the record from the entries.
 #[must_use]
 pub fn date_text(entries: &[Entry]) -> Option<String> {
     let (mut date, mut time) = (None, None);

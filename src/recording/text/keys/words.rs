@@ -1,15 +1,15 @@
-//! What keys are about, by their words.
+//! Topics of keys, by their words.
 
 use super::Topic;
 use crate::recording::text::vocabulary::{has, meaning, words};
 
-/// Whether a key that can be about the rate is more often about the signal.
+/// Whether a key that may concern the rate more often concerns the signal.
 #[must_use]
 pub fn is_vague(key: &str) -> bool {
     has("vague keys", without_brackets(&key.to_lowercase()))
 }
 
-/// What a key is about.
+/// Topic of a key.
 #[must_use]
 pub fn topic(key: &str) -> Option<Topic> {
     let whole = key.to_lowercase();

@@ -1,4 +1,4 @@
-//! GW Instek exports. In the mode `Fast` they hold no volts but steps of the screen, 25 to a division
+//! GW Instek exports. In the mode `Fast` they contain screen steps instead of volts, 25 per division
 //! (GDS-2000 user manual, page 121: "one division includes 25 points of horizontal and vertical data";
 //! GDS-2000A user manual, page 187: fast data are "recorded as integers").
 
@@ -11,7 +11,7 @@ use crate::recording::text::table::Layout;
 use crate::recording::{Channel, Recording};
 use crate::warning::Warning;
 
-/// Steps of a division of the screen.
+/// Steps per division of the screen.
 const STEPS: f64 = 25.0;
 
 const MAKER: Maker = Maker::of_seconds("GW Instek").with_reader(read);
@@ -30,7 +30,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
     let (mut scaled, mut bare) = (Vec::new(), Vec::new());
     for (place, channel) in recording.channels.iter_mut().enumerate() {
         let said = |key: &str| of_channel(&details, key, place);
-        // Older ones know no modes.
+        // Older models have no modes.
         let is_fast = said("Mode").is_none_or(|mode| mode == "Fast");
         if !is_fast || !is_whole(channel) {
             continue;
@@ -68,13 +68,13 @@ fn warning(names: &[String], text: impl Fn(&str) -> String) -> Option<Warning> {
     (!names.is_empty()).then(|| Warning::new("screen-steps", text(&quoted.join(", "))))
 }
 
-/// Whether all samples are whole numbers.
+/// Whether all samples are integers.
 fn is_whole(channel: &Channel) -> bool {
     let mut finite = channel.samples.iter().filter(|value| value.is_finite());
     finite.all(|value| value.fract() == 0.0)
 }
 
-/// The value of a key for a channel: the keys stand again above each of them.
+/// The value of a key for a channel: the keys are repeated above each of them.
 fn of_channel<'a>(details: &'a [(String, String)], key: &str, place: usize) -> Option<&'a str> {
     let (_, values) = details.iter().find(|(name, _)| name == key)?;
     let mut values = values
@@ -84,9 +84,9 @@ fn of_channel<'a>(details: &'a [(String, String)], key: &str, place: usize) -> O
     values.nth(place)
 }
 
-/// Volts (or amperes) of a step, where the head leaves no doubt: the trace is not shifted (whether the
-/// steps count from the middle of the screen or from the zero of the trace is told differently), and no
-/// probe divides.
+/// Volts (or amperes) per step, if the header is unambiguous: the trace is not shifted (sources differ
+/// on whether the steps count from the middle of the screen or from the zero of the trace), and no
+/// probe attenuates.
 fn volts_per_step<'a>(said: &impl Fn(&str) -> Option<&'a str>) -> Option<f64> {
     let number = |key: &str| keys::quantity(said(key)?, b'.').map(|(value, _)| value);
     let scale = number("Vertical Scale").filter(|scale| *scale > 0.0)?;

@@ -1,5 +1,5 @@
 //! Teledyne LeCroy text export: `LECROY` with the model, `Segments,2,SegmentSize,1252`, a line for each
-//! segment's trigger, then time and amplitude of all segments below each other.
+//! segment's trigger, then time and amplitude of all segments in sequence.
 
 use super::{Maker, Rule};
 use crate::failure::Failure;
@@ -16,7 +16,7 @@ const MAKER: Maker = Maker::of_seconds("LeCroy").with_reader(read);
 /// The rule.
 pub const ALL: &[Rule] = &[(MAKER, |head| head.starts(0, "LECROY"))];
 
-/// Segments as the head lists them.
+/// Segments listed in the header.
 struct Segments {
     size: usize,
     list: Vec<Segment>,
@@ -46,7 +46,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
             format!("the head announces {said} samples, but there are {there}"),
         ));
     } else {
-        // These files end without a line end, and all that was announced is there.
+        // These files end without a line end, and everything announced is there.
         let ended = |lost: &mut Warning| lost.code == "unended-last-line";
         recording.lost.take_if(ended);
     }
@@ -62,7 +62,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
     Ok(recording)
 }
 
-/// Samples of the first channel in all segments together.
+/// Number of samples of the first channel over all segments.
 fn samples_of_a_channel(recording: &Recording) -> usize {
     let heading = recording.channels.first().map(|channel| &channel.heading);
     let same = recording
@@ -72,8 +72,8 @@ fn samples_of_a_channel(recording: &Recording) -> usize {
     same.map(|channel| channel.samples.len()).sum()
 }
 
-/// The cells of a line above the table: between commas, semicolons, tabs or spaces, the date and the
-/// time of a trigger being one cell.
+/// Cells of a line above the table, separated by commas, semicolons, tabs or spaces, with date and
+/// time of a trigger as one cell.
 fn cells(text: &str) -> Vec<String> {
     let text = text.trim();
     if let Some(mark) = [',', ';', '\t']

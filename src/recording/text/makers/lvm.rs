@@ -1,6 +1,6 @@
-//! LabVIEW measurement files (`.lvm`): a header for the file, then segments, each with a header of
-//! its own that says rate, start and unit of each channel. National Instruments, "Specification for
-//! the LabVIEW Measurement File".
+//! LabVIEW measurement files (`.lvm`): a file header, then segments, each with its own header with
+//! rate, start and unit of each channel. National Instruments, "Specification for the LabVIEW
+//! Measurement File".
 
 use std::sync::Arc;
 
@@ -24,13 +24,13 @@ const END: &str = "***End_of_Header***";
 /// The rule.
 pub const ALL: &[Rule] = &[
     (Maker::of_seconds("LabVIEW LVM").with_reader(read), |head| {
-        // The header of the file may be cut off.
+        // The file header may be missing.
         let is_segment = || head.starts(0, "Channels") && head.any(|line| line.starts_with(END));
         head.starts(0, "LabVIEW Measurement") || is_segment()
     }),
 ];
 
-/// Where the times of the samples stand.
+/// Location of the sample times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stamps {
     No,
@@ -38,14 +38,14 @@ enum Stamps {
     Multi,
 }
 
-/// What the header of the file says.
+/// Content of the file header.
 struct File {
     dialect: Dialect,
     stamps: Stamps,
     details: Vec<(String, String)>,
 }
 
-/// What the header of a segment says, a value for each channel.
+/// Content of a segment header, one value per channel.
 #[derive(Default)]
 struct Header {
     channels: usize,
@@ -104,7 +104,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
     Ok(recording)
 }
 
-/// Lines of a text, one after the other.
+/// A cursor over the lines of a text.
 struct Cursor<'a> {
     text: &'a [u8],
     at: usize,
@@ -124,8 +124,8 @@ impl Cursor<'_> {
         Some(line.trim_end_matches('\r').to_owned())
     }
 
-    /// The decimal mark of the numbers in the header of the first segment, where the file does not
-    /// say it: `X0` is written with decimals.
+    /// Decimal mark of the numbers in the first segment header, if the file does not give it: `X0`
+    /// is written with decimals.
     fn decimal(&self, separator: u8) -> u8 {
         let rest = &self.text[self.at.min(self.text.len())..];
         let head = &rest[..rest.len().min(1 << 14)];
@@ -141,7 +141,7 @@ impl Cursor<'_> {
         }
     }
 
-    /// Goes to the next line that begins so; it is the next to be read.
+    /// Advances to the next line that begins with `start`, without consuming it.
     fn skip_to(&mut self, start: &str) -> bool {
         loop {
             let (at, number) = (self.at, self.number);
@@ -214,8 +214,8 @@ fn segment_header(lines: &mut Cursor, file: &File) -> Header {
         }
         let mut cells = file.dialect.cells(&line).into_iter();
         let key = cells.next().unwrap_or_default();
-        // With a column of times for each channel, the values stand above the channels alone;
-        // otherwise an empty cell is that of a channel without a value.
+        // With a time column for each channel, the values are above the channels only; otherwise an
+        // empty cell means a channel without a value.
         let values: Vec<String> = match file.stamps {
             Stamps::Multi => cells.filter(|cell| !cell.is_empty()).collect(),
             Stamps::No | Stamps::One => cells.collect(),
@@ -237,7 +237,7 @@ fn segment_header(lines: &mut Cursor, file: &File) -> Header {
     header
 }
 
-/// The value of a channel, if there is one.
+/// The value of a channel, if any.
 fn of(values: &[String], place: usize) -> Option<&str> {
     let value = values.get(place).map(String::as_str);
     value.filter(|value| !value.is_empty())
@@ -296,7 +296,7 @@ fn segment_channels(
     Ok(channels)
 }
 
-/// Number of channels: names may go beyond those that the header counts, but for the comments.
+/// Number of channels: there may be more names than the header counts, excluding the comments.
 fn count(file: &File, header: &Header, names: &[String]) -> usize {
     let named = names
         .iter()
@@ -309,7 +309,7 @@ fn count(file: &File, header: &Header, names: &[String]) -> usize {
     }
 }
 
-/// Reads the columns of a segment; a remark may stand in the column after the last channel.
+/// Reads the columns of a segment; a remark may be in the column after the last channel.
 fn columns(lines: &mut Cursor, file: &File, count: usize) -> Result<Vec<Column>, Failure> {
     let numbers = match file.stamps {
         Stamps::Multi => 0..2 * count,
@@ -325,7 +325,7 @@ fn columns(lines: &mut Cursor, file: &File, count: usize) -> Result<Vec<Column>,
 
 fn axis(file: &File, header: &Header, place: usize, times: &Column, reading: &Reading) -> TimeAxis {
     let number = |values: &[String]| {
-        // Where one value stands for all channels, it is the first.
+        // A single value for all channels is the first one.
         let text = of(values, place).or_else(|| of(values, 0))?;
         number::cell(text, file.dialect.decimal)
     };
@@ -353,12 +353,12 @@ fn axis(file: &File, header: &Header, place: usize, times: &Column, reading: &Re
     axis
 }
 
-/// What the horizontal axis of a channel shows, if it is not the time: `Frequency`.
+/// Quantity of a channel's horizontal axis, if it is not time: `Frequency`.
 fn other_dimension(header: &Header, place: usize) -> Option<&str> {
     of(&header.dimensions, place).filter(|dimension| !dimension.starts_with("Time"))
 }
 
-/// The horizontal axis as a channel and what should be known of it, where it is not the time.
+/// The horizontal axis as a channel, with a warning, if it is not time.
 fn no_time(file: &File, header: &Header, values: &Column) -> Option<(Option<Channel>, Warning)> {
     let dimension = other_dimension(header, 0)?;
     let is_there = file.stamps == Stamps::One && !values.values.is_empty();

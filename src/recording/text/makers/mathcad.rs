@@ -1,5 +1,5 @@
-//! Exports for MathCad of Tektronix oscilloscopes: four numbers, one a line, then the samples: their count, the time between
-//! them in s, and where among them the trigger lies, in whole samples and a part of one (TDS Family programmer manual,
+//! Tektronix oscilloscope exports for MathCad: four numbers, one per line, then the samples: their count, the time
+//! between them in s, and the trigger position, in whole samples and a fraction (TDS Family programmer manual,
 //! SAVe:WAVEform:FILEFormat).
 
 use super::{Maker, Rule};
@@ -19,7 +19,7 @@ const DIALECT: Dialect = Dialect {
     delimiter: Delimiter::Spaces,
     decimal: b'.',
 };
-/// Lines before the first sample.
+/// Number of lines before the first sample.
 const HEAD: usize = 4;
 
 /// The rule.
@@ -28,17 +28,17 @@ pub const ALL: &[Rule] = &[(
     |head| MathcadHead::of(head).is_some(),
 )];
 
-/// What the four numbers say.
+/// Content of the four numbers.
 struct MathcadHead {
     count: f64,
     step_s: f64,
-    /// Samples before the trigger.
+    /// Number of samples before the trigger.
     trigger: f64,
 }
 
 impl MathcadHead {
-    /// The count is a whole number as large as there are lines, the step is far below a second, the trigger lies among the
-    /// samples, and its part of a sample is one.
+    /// The count is an integer as large as the number of lines, the step is far below a second, the trigger is within
+    /// the samples, and its fraction is below one sample.
     fn of(head: &Head) -> Option<Self> {
         let value = |line: usize| number::cell(head.lines.get(line)?.text.trim(), b'.');
         let [count, step_s, whole, part] = [value(0)?, value(1)?, value(2)?, value(3)?];

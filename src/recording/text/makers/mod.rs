@@ -1,8 +1,8 @@
-//! Makers' ways to write recordings. To add one: a line in the list `makers`
-//! of the vocabulary, or a file with its rule and a line in [`RULES`].
+//! Makers' recording formats. To add one: a line in the list `makers` of the vocabulary, or a file
+//! with its rule and a line in [`RULES`].
 //!
-//! Most exports differ from a plain table only by what stands above it, and the general reader takes
-//! them as they are: their rule tells their name, and what the files leave unsaid. Those with a
+//! Most exports differ from a plain table only in the lines above it, and the general reader handles
+//! them: their rule gives their name, and defaults that the files do not state. Those with a
 //! structure of their own have a reader.
 
 use super::chunks::Chunks;
@@ -21,24 +21,24 @@ mod rigol;
 mod rohde;
 mod tektronix;
 
-/// A way to write recordings.
+/// A maker's recording format.
 #[derive(Debug, Clone, Copy)]
 pub struct Maker {
-    /// Its name, for people.
+    /// Name, for messages.
     pub name: &'static str,
-    /// What its files leave unsaid.
+    /// Defaults that its files do not state.
     pub hints: Hints,
-    /// Its reader, if the general one does not do.
+    /// Its reader, if the general one is not sufficient.
     pub read: Option<Reader>,
 }
 
 /// Reads a text into a recording without source and dialect.
 pub type Reader = fn(&mut Chunks, &Reading) -> Result<Recording, Failure>;
 
-/// A maker, and whether a file is written so, by its first lines.
+/// A maker, and a predicate on the first lines of a file.
 pub type Rule = (Maker, fn(&Head) -> bool);
 
-/// The rules, the most particular first.
+/// The rules, most specific first.
 const RULES: &[&[Rule]] = &[
     lvm::ALL,
     lecroy::ALL,
@@ -51,7 +51,7 @@ const RULES: &[&[Rule]] = &[
 ];
 
 impl Maker {
-    /// One whose tables the general reader takes as they are.
+    /// One whose tables the general reader handles.
     const fn plain(name: &'static str) -> Self {
         Self {
             name,

@@ -1,4 +1,4 @@
-//! Exports that the general reader takes as they are: how each is told.
+//! Recognition of exports that the general reader handles.
 
 use super::{Maker, Rule};
 use crate::recording::text::head::Head;
@@ -6,7 +6,7 @@ use crate::recording::text::header::after_definition;
 use crate::recording::text::table::Hints;
 use crate::recording::text::vocabulary::words;
 
-/// Those that no list of words tells.
+/// Those not recognised by a list of words.
 pub const ALL: &[Rule] = &[
     (
         Maker {
@@ -33,7 +33,7 @@ pub const ALL: &[Rule] = &[
     }),
 ];
 
-/// Units of time and of channels in brackets below the names, and an empty line below them.
+/// Units of time and of channels in brackets below the names, followed by an empty line.
 fn is_pico_scope(head: &Head) -> bool {
     let times = ["(s)", "(ms)", "(us)", "(\u{b5}s)", "(ns)"];
     let [_, units, empty, ..] = head.lines.as_slice() else {
@@ -45,7 +45,7 @@ fn is_pico_scope(head: &Head) -> bool {
         && empty.text.trim().is_empty()
 }
 
-/// The maker that a list of words tells.
+/// The maker recognised by a list of words.
 pub fn listed(head: &Head) -> Option<Maker> {
     let is_so = |sign: &str| match sign.split_once(' ') {
         Some(("first", start)) => head.starts(0, start),

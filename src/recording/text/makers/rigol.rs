@@ -1,6 +1,6 @@
-//! Rigol exports with start and increment in the cells after the channels:
-//! `X,CH1,CH2,Start,Increment` above `Sequence,Volt,Volt,-3.5e-03,5e-06`; the first column only counts.
-//! The other ways of this maker are plain tables.
+//! Rigol exports with start and increment in the cells after the channels: `X,CH1,CH2,Start,Increment`
+//! above `Sequence,Volt,Volt,-3.5e-03,5e-06`; the first column is an index. Other formats of this maker
+//! are plain tables.
 
 use super::{Maker, Rule};
 use crate::failure::{ErrorCode, Failure};
@@ -32,11 +32,11 @@ pub const ALL: &[Rule] = &[
     }),
 ];
 
-/// What the two lines of the head say.
+/// Content of the two header lines.
 struct Start {
     names: Vec<String>,
     units: Vec<String>,
-    /// Columns before Start: the count and the channels.
+    /// Number of columns before Start: the index and the channels.
     width: usize,
     start_s: f64,
     step_s: f64,
@@ -87,7 +87,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
         axis.rate_hz = Some(rate_hz);
         axis.rate_from = RateFrom::Given;
     }
-    // Bare values have no column that counts.
+    // Bare values have no index column.
     let counts = start
         .names
         .first()

@@ -1,6 +1,5 @@
-//! Pairs of values in exports of Rohde & Schwarz: each time stands twice, with the minimum and the maximum that were
-//! sampled there (RTM user manual 1317.4726, "CSV format"; RTC1000 user manual 1335.7352, 8.3.1.1). Single values are a plain
-//! table.
+//! Pairs of values in Rohde & Schwarz exports: each time occurs twice, with the minimum and the maximum sampled there
+//! (RTM user manual 1317.4726, "CSV format"; RTC1000 user manual 1335.7352, 8.3.1.1). Single values are a plain table.
 
 use std::sync::Arc;
 
@@ -15,7 +14,7 @@ use crate::recording::{Channel, Recording, TimeAxis};
 const MAKER: Maker =
     Maker::of_seconds("Rohde & Schwarz, pairs of minimum and maximum").with_reader(read);
 
-/// Pairs that the rule looks at.
+/// Number of pairs examined by the rule.
 const LOOKED_AT: usize = 2;
 
 /// The rule.
@@ -38,7 +37,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
     Ok(recording)
 }
 
-/// The first and the second value of each pair, as channels of their own; the channel itself if some are no pairs.
+/// The first and the second value of each pair, as separate channels; the channel itself if some are not pairs.
 fn halves(channel: &Channel) -> Vec<Channel> {
     let stamps = channel
         .axis

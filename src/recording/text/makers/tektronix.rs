@@ -1,6 +1,6 @@
-//! Tektronix exports of the older kind: keys and values in the first columns, time and volts beside
-//! them from the first line on (`Record Length,2500,,-0.0005,0.02`), perhaps several times side by side.
-//! The newer ones, with a head above `TIME,CH1`, are plain tables.
+//! Older Tektronix exports: keys and values in the first columns, time and volts next to them from the
+//! first line on (`Record Length,2500,,-0.0005,0.02`), possibly several times side by side. The newer
+//! ones, with a header above `TIME,CH1`, are plain tables.
 
 use std::sync::Arc;
 
@@ -34,7 +34,7 @@ pub const ALL: &[Rule] = &[
     }),
 ];
 
-/// The dialect and the columns at which keys begin, if the first line is so.
+/// The dialect and the columns at which keys begin, if the first line matches.
 fn side_by_side(head: &Head) -> Option<(Dialect, Vec<usize>, usize)> {
     let line = &head.lines.first()?.text;
     for (delimiter, decimal) in [

@@ -1,9 +1,9 @@
-//! Rows as read, cut into parts.
+//! Splitting of parsed rows.
 
 use super::{Column, Rows};
 
 impl Rows {
-    /// Leaves out the rows from one on.
+    /// Removes the rows from `count` on.
     pub fn truncate(&mut self, count: usize) {
         for column in &mut self.columns {
             column.values.truncate(count);
@@ -12,7 +12,7 @@ impl Rows {
         self.count = self.count.min(count);
     }
 
-    /// Leaves out the first row.
+    /// Removes the first row.
     pub fn drop_first(&mut self) {
         for column in &mut self.columns {
             if !column.values.is_empty() {
@@ -30,7 +30,7 @@ impl Rows {
         self.count = self.count.saturating_sub(1);
     }
 
-    /// The rows before which a line is no row: a comment, an empty line, a text.
+    /// The rows preceded by a line that is not a row: a comment, an empty line, a text.
     pub fn after_other_lines(&self) -> impl Iterator<Item = usize> {
         self.breaks
             .iter()
@@ -38,7 +38,7 @@ impl Rows {
             .filter(|row| *row > 0 && *row < self.count)
     }
 
-    /// Takes the rows from one on out as rows of their own.
+    /// Splits the rows from one on off as separate rows.
     pub fn split_off(&mut self, row: usize) -> Self {
         let columns = self.columns.iter_mut().map(|column| {
             let values = column.values.split_off(row.min(column.values.len()));
@@ -63,7 +63,7 @@ impl Rows {
     }
 }
 
-/// Number of the line of a row, by the rows and lines at which counting went on.
+/// Line number of a row, from the rows and lines at which counting continued.
 pub(super) fn line_of(breaks: &[(usize, usize)], row: usize) -> usize {
     let place = breaks.partition_point(|(first, _)| *first <= row);
     place

@@ -1,25 +1,26 @@
-//! Items of lists that rows name, as exports of ROS messages have them: `effort[0]` belongs to `name[0]`.
+//! List items identified by names in the row, as in exports of ROS messages: `effort[0]` belongs to
+//! `name[0]`.
 
-/// A column that holds one item of a list, and where the item may stand instead.
+/// A column that contains one item of a list, and its possible other locations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Item {
     /// The column.
     pub column: usize,
     /// Name of the item in the first row.
     name: String,
-    /// Columns with the names, and those with the values beside them.
+    /// Columns of the names, and those of the corresponding values.
     places: Vec<(usize, usize)>,
 }
 
 impl Item {
-    /// The column with the item's value in a row, wherever the row names it.
+    /// The column with the item's value in a row, according to the names in the row.
     pub(super) fn place_in(&self, cells: &[String]) -> Option<usize> {
         let is_named = |(name, _): &&(usize, usize)| {
             cells
                 .get(*name)
                 .is_some_and(|cell| cell.trim() == self.name)
         };
-        // A name may be missing where there is none to follow.
+        // A name may be missing if there is none to follow.
         if self.name.is_empty() {
             return Some(self.column);
         }
@@ -27,7 +28,7 @@ impl Item {
     }
 }
 
-/// The items of a table: all columns `list[i]` with a column `name[i]` of the same message beside them.
+/// Items of a table: all columns `list[i]` with a column `name[i]` of the same message.
 pub fn items(headings: &[&str], first_row: &[String]) -> Vec<Item> {
     let parts: Vec<Option<(&str, &str)>> =
         headings.iter().map(|heading| list_item(heading)).collect();
@@ -59,7 +60,7 @@ pub fn items(headings: &[&str], first_row: &[String]) -> Vec<Item> {
     parts.iter().enumerate().filter_map(of).collect()
 }
 
-/// A list and the number in it: `effort` and `0` of `effort[0]`, `effort.0` and `effort_0`.
+/// A list and its index: `effort` and `0` for `effort[0]`, `effort.0` and `effort_0`.
 fn list_item(heading: &str) -> Option<(&str, &str)> {
     let heading = heading.trim();
     let (list, index) = match heading.strip_suffix(']') {
@@ -70,7 +71,7 @@ fn list_item(heading: &str) -> Option<(&str, &str)> {
     (is_number && !list.is_empty()).then_some((list, index))
 }
 
-/// Whether a list holds the names of another one of the same message.
+/// Whether a list contains the names of another one of the same message.
 fn is_names_of(names: &str, list: &str) -> bool {
     let split = |path: &'_ str| path.rfind(['.', '/']).map_or(0, |mark| mark + 1);
     let (message, last) = names.split_at(split(names));

@@ -1,23 +1,23 @@
-//! A row of plain numbers, read without looking twice.
+//! Single-pass parsing of a row of plain numbers.
 
 use super::{ColumnKind, RowPlan, Rows, line_end, span};
 use crate::io::number;
 use crate::recording::text::clock::Clock;
 use crate::recording::text::dialect::Delimiter;
 
-/// A cell that was read: its value, if it has one, and where it ends.
+/// A parsed cell: its value, if any, and its end.
 type PlainCell = (Option<f64>, usize);
 
 impl Rows {
-    /// Reads a row of plain numbers, empty cells, dates and texts without quotes; where the next line
-    /// begins, or `None` if it needs care.
+    /// Parses a row of plain numbers, empty cells, dates and texts without quotes; returns the start
+    /// of the next line, or `None` if it needs careful parsing.
     #[inline]
     pub(super) fn plain_row(&mut self, text: &[u8], at: usize, plan: &RowPlan) -> Option<usize> {
         let row = self.count;
         let before = self.stamp_text.len();
         let read = self.plain_cells(text, at, plan);
         if read.is_none() {
-            // Taken back: the careful way reads the whole line anew.
+            // Undone: the careful parser reads the whole line again.
             for column in &mut self.columns {
                 column.values.truncate(row);
             }
@@ -31,7 +31,7 @@ impl Rows {
 
     #[inline]
     fn plain_cells(&mut self, text: &[u8], start: usize, plan: &RowPlan) -> Option<usize> {
-        // Names are looked at with care.
+        // Names need careful parsing.
         if !plan.items.is_empty() {
             return None;
         }
@@ -92,7 +92,7 @@ impl RowPlan {
         Some((Some(value), end))
     }
 
-    /// Where a cell without quotes ends.
+    /// End of a cell without quotes.
     #[inline]
     fn text_end(&self, text: &[u8], at: usize) -> Option<usize> {
         let rest = &text[at..];
@@ -111,7 +111,7 @@ impl RowPlan {
         Some(end)
     }
 
-    /// Where the text of a cell begins.
+    /// Start of the text of a cell.
     #[inline]
     fn skip_blanks(&self, text: &[u8], mut at: usize) -> usize {
         let is_spaces = self.dialect.delimiter == Delimiter::Spaces;
@@ -121,7 +121,7 @@ impl RowPlan {
         at
     }
 
-    /// The mark or line end after a cell that was read up to `at`.
+    /// Position of the separator or line end after a cell parsed up to `at`.
     #[inline]
     fn cell_end(&self, text: &[u8], at: usize) -> Option<usize> {
         let at = match self.dialect.delimiter {
@@ -136,7 +136,7 @@ impl RowPlan {
         }
     }
 
-    /// Where the next cell begins, from the end of the one before; the cells that a row ends before are
+    /// Start of the next cell, from the end of the previous one; cells beyond the end of a row are
     /// empty.
     #[inline]
     fn next_cell(&self, text: &[u8], at: usize) -> Option<usize> {
@@ -147,8 +147,8 @@ impl RowPlan {
         }
     }
 
-    /// Where the next line begins, from the end of the last cell that is wanted. After the last column
-    /// there may be empty cells only.
+    /// Start of the next line, from the end of the last wanted cell. After the last column only empty
+    /// cells are allowed.
     #[inline]
     pub(in crate::recording::text) fn row_end(&self, text: &[u8], at: usize) -> Option<usize> {
         match text.get(at) {

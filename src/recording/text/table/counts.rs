@@ -1,22 +1,24 @@
-//! What a column holds, by its cells in the first rows.
+//! Content of a column, from its cells in the first rows.
 
 use crate::recording::text::cell::Cell;
 use crate::recording::text::clock::Clock;
 use crate::recording::text::rows::ColumnKind;
 
-/// Numbers from which on stamps are taken as differences: seconds since 1973, and less than an `i64` holds.
+/// Threshold above which stamps are stored as differences: seconds since 1973, within the range of an
+/// `i64`.
 const LARGE: f64 = 1e8;
 const LARGEST: f64 = 9e18;
 
-/// How often a column holds what in the first rows.
+/// Frequencies of the kinds of content of a column in the first rows.
 #[derive(Clone, Default)]
 pub(super) struct Counts {
     numbers: usize,
     texts: usize,
-    /// Dates and times, and the first of them.
+    /// Number of dates and times, and the first of them.
     clocks: usize,
     first_clock: Option<(Clock, String)>,
-    /// Numbers so large that the last digits of a time are lost in an `f64`, and the whole part of the first.
+    /// Number of values so large that a time loses its last digits in an `f64`, and the integer part of the
+    /// first.
     large: usize,
     origin: Option<i64>,
 }
@@ -43,7 +45,7 @@ impl Counts {
         }
     }
 
-    /// What the column holds; `None` if nothing. And its first date or time, as written.
+    /// Content of the column, `None` if empty, and its first date or time, as written.
     pub fn kind(self) -> (Option<ColumnKind>, Option<String>) {
         if self.numbers + self.clocks + self.texts == 0 {
             return (None, None);

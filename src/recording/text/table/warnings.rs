@@ -1,4 +1,4 @@
-//! What should be known of how a table was read.
+//! Warnings about the reading of a table.
 
 use super::Layout;
 use crate::print::plural;
@@ -7,7 +7,7 @@ use crate::recording::text::rows::LineNotes;
 use crate::warning::Warning;
 
 impl Layout {
-    /// What should be known of its lines, and of what was taken for granted; `rows` is their number.
+    /// Warnings about its lines and assumptions; `rows` is their number.
     pub fn warnings(&self, notes: &LineNotes, rows: usize) -> Vec<Warning> {
         let mut warnings: Vec<Warning> =
             of_lines(notes, notes.zeros + self.zeros_above, self.line + rows);
@@ -27,7 +27,7 @@ impl Layout {
             .collect()
     }
 
-    /// A warning if the head announces another number of samples than there are rows.
+    /// A warning if the number of samples in the header differs from the number of rows.
     fn count_differs(&self, rows: usize) -> Option<Warning> {
         let mut entries = self.header.entries.iter();
         let entry = entries.find(|entry| entry.topic() == Some(Topic::Count))?;
@@ -53,7 +53,7 @@ fn of_lines(notes: &LineNotes, zeros: usize, end: usize) -> Vec<Warning> {
             format!("{} in the text left out", plural(zeros, "zero byte")),
         ));
     }
-    // A last word such as EOF, behind all rows, is no fault.
+    // A last word such as EOF, after all rows, is not a fault.
     let is_footer = |line: usize, text: &str| {
         notes.odd_count == 1 && line >= end && !text.chars().any(|c| c.is_ascii_digit())
     };

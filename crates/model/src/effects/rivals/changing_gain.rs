@@ -1,7 +1,8 @@
-//! A gain that changes evenly over the record and is right somewhere in it.
+//! A gain that drifts linearly over the record and is right at some point within it.
 //!
 //! `y = x (1 + a + r t)`. **Valid for small changes.** Mistaken for `thermal-drift`, whose sensitivity is right at
-//! the start of a record, and, in a sweep, where time stands for frequency, for `second-mode` and `recorder-lowpass`.
+//! the start of a record, and, in a sweep, where time and frequency go together, for `second-mode` and
+//! `recorder-lowpass`.
 
 use crate::effects::{
     Action, Distortion, Effect, EffectParameter, Form, ParameterScale, SampleClock, Stage,

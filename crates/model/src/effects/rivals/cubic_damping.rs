@@ -1,10 +1,10 @@
-//! Damping that grows with the cube of the speed.
+//! Damping proportional to the cube of the speed.
 //!
 //! `n = d x'³`. B. Ravindra, A. K. Mallik, *Performance of non-linear vibration isolators under harmonic
-//! excitation*, J. Sound Vib. 170 (1994), 325. **Valid where viscous and quadratic parts are told apart by level.**
+//! excitation*, J. Sound Vib. 170 (1994), 325. **Valid where the level separates viscous and quadratic parts.**
 //! Mistaken for `quadratic-damping`.
 //!
-//! Integration: for a fixed `x`, `x' = v/√(1 + 2 ω₀² d v² t)` exactly.
+//! Integration: for constant `x`, `x' = v/√(1 + 2 ω₀² d v² t)` exactly.
 
 use crate::effects::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 

@@ -1,7 +1,7 @@
-//! Laws that are not offered as effects, but put to the records beside them: where one of them explains more than every
-//! effect of the list, the effect that comes nearest is not named.
+//! Laws that are not offered as effects, but fitted to the records alongside them: where one of them explains more than
+//! every effect of the list, the closest effect is not named.
 //!
-//! Each is the plainest law of its kind, which tells that kind apart from the list and no more.
+//! Each is the simplest law of its kind, enough to distinguish that kind from the list.
 
 mod changing_gain;
 mod cubic_damping;

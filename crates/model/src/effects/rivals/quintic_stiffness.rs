@@ -1,7 +1,7 @@
-//! Stiffness that sets in with a higher power than the cube.
+//! Stiffness nonlinearity of a higher power than the cube.
 //!
 //! `n = c x⁵`. I. Kovacic, M. J. Brennan (eds.), *The Duffing Equation* (2011), 1. **Valid where the cubic part is
-//! small.** Mistaken for `cubic-stiffness` and, through what four parameters can do, `bouc-wen-hysteresis`.
+//! small.** Mistaken for `cubic-stiffness` and, owing to its four parameters, `bouc-wen-hysteresis`.
 
 use crate::effects::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 

@@ -1,9 +1,9 @@
-//! Damping that grows with the displacement, as of a film or a bush that is squeezed.
+//! Damping that grows with displacement, as of a squeezed film or bush.
 //!
 //! `n = d x² x'`. B. van der Pol, *On relaxation-oscillations*, Phil. Mag. 2 (1926), 978 (there with the other sign
 //! at rest). **Valid for small changes of the gap.** Mistaken for `quadratic-damping` and `bouc-wen-hysteresis`.
 //!
-//! Integration: for a fixed `x`, `x' = v e^{−ω₀² d x² t}` exactly.
+//! Integration: for constant `x`, `x' = v e^{−ω₀² d x² t}` exactly.
 
 use crate::effects::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 
