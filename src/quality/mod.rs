@@ -97,7 +97,7 @@ pub fn coarse(
     Warning::new(
         "coarse-quantisation",
         format!(
-            "{}: rounding alone adds noise of 0.29 steps rms; use a smaller range of the recorder",
+            "{}: rounding alone adds noise of 0.29 steps rms; use a smaller input range",
             join(named)
         ),
     )

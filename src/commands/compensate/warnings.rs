@@ -83,8 +83,9 @@ pub(super) fn of_ends(undo: Option<&ChainInverse>, edge_s: f64) -> Option<Warnin
     Some(Warning::new(
         "ends-felt-far",
         format!(
-            "dividing out \"{effect}\" has no end in time: what was before the record and behind it is felt beyond the first and last \
-             {} s, less only in proportion to the distance; leave out more at both ends, or record from rest to rest",
+            "dividing out \"{effect}\" has no end in time: what was before the record and behind it is felt beyond the \
+             first and last {} s, less only in proportion to the distance; discard more at both ends, or record from \
+             rest to rest",
             rounded(edge_s, 3)
         ),
     ))
@@ -149,7 +150,7 @@ fn empty_plot(report: &CompensateReport) -> Warning {
     Warning::new(
         "empty-plot",
         format!(
-            "no sample lies within --plot-range; the record runs from {} to {}",
+            "--plot-range contains no samples; the record runs from {} to {}",
             report.start.text(),
             end.text()
         ),

@@ -136,8 +136,8 @@ pub(super) fn warning(
         Warning::new(
             "speed-changes",
             format!(
-                "the fundamental changes over the record, from {} to {} Hz: the components are averages that come \
-                 out too small, the more the higher their order; take a part of constant speed with --range",
+                "the fundamental changes over the record, from {} to {} Hz: the components are averages that come out \
+                 too small, the more the higher their order; select a part of constant speed with --range",
                 rounded(slowest.frequency_hz, 6),
                 rounded(fastest.frequency_hz, 6)
             ),
@@ -279,8 +279,8 @@ pub(super) fn load_changes(
         Warning::new(
             "load-changes",
             format!(
-                "the mean torque changes over the record by {} % of its largest value, most about {} s after its start: the components \
-                 are averages over different loads; take a part of constant load with --range",
+                "the mean torque changes over the record by {} % of its largest value, most about {} s after its \
+                 start: the components are averages over different loads; select a part of constant load with --range",
                 rounded(100.0 * change / largest, 2),
                 rounded(at, 2)
             ),

@@ -151,9 +151,9 @@ pub(super) fn short_pulses(result: &mut Identification, part: f64) {
         result.warn(
             "short-pulse",
             format!(
-                "the pulses of the hammer last few samples, so that frequencies above half the rate fold into their spectrum: \
-                 gains may be wrong by about {} %, which their uncertainties do not include, unless the recorder has an \
-                 anti-aliasing filter; record faster, or hit with a softer tip",
+                "the pulses of the hammer last few samples, so that frequencies above half the rate fold into their \
+                 spectrum: gains may be wrong by about {} %, which their uncertainties do not include, unless the \
+                 recorder has an anti-aliasing filter; record at a higher rate, or use a softer tip",
                 rounded(100.0 * OF_GAIN * part, 1)
             ),
         );

@@ -152,7 +152,7 @@ pub fn identify(
     if is_one_weight {
         result.warn(
             "one-weight",
-            "with one load beside no load, a curved characteristic would not show; apply other loads as well, or stay near \
+            "with one load beside no load, a curved characteristic would not show; apply further loads, or stay near \
              this one",
         );
     }
