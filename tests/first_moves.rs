@@ -488,10 +488,7 @@ fn an_applied_channel_of_another_time_is_no_effect() {
         assert!(!ran.stdout.contains("verdict: explained"), "{ran:?}");
     };
     for late in [0.5e-4, 3e-4, 1e-3] {
-        says(
-            diagnose(late, 1.0),
-            &["the applied channel comes late", "ms"],
-        );
+        says(diagnose(late, 1.0), &["the applied channel lags by", "ms"]);
     }
     says(diagnose(0.0, 1.0005), &["different clocks", "ppm"]);
     let early = diagnose(-3e-4, 1.0);

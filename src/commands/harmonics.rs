@@ -386,7 +386,7 @@ fn visible_orders(
         warnings.push(Warning::new(
             "orders-above-nyquist",
             format!(
-                "above half the sampling rate of {} Hz, and omitted: {}",
+                "omitted, as above half the sampling rate of {} Hz: {}",
                 short(rate_hz),
                 match first == last {
                     true => format!("order {}", short(*first)),
@@ -442,7 +442,7 @@ fn lost_warning(components: &[ComponentTorque]) -> Option<Warning> {
         Warning::new(
             "components-lost-in-noise",
             format!(
-                "below twice their own uncertainty, so that they may be zero: {}",
+                "below twice their own uncertainty, so they may be zero: {}",
                 named(&lost)
             ),
         )

@@ -411,7 +411,8 @@ fn applied_unit(
             warnings.push(Warning::new(
                 "unit-assumed",
                 format!(
-                    "the channel \"{}\" gives no unit: {expected} was assumed, as the stand takes it; give another with --unit",
+                    "the channel \"{}\" has no unit: {expected}, which the stand expects, was assumed; give another \
+                     with --unit",
                     chosen.name
                 ),
             ));

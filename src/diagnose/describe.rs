@@ -188,9 +188,9 @@ fn records_apart(before: &ScoredModel) -> Option<Warning> {
     Some(Warning::new(
         "records-apart",
         format!(
-            "no single plain stand fits both training and held-out records: fitted separately, the training records give {:.5} Hz \
-             and damping ratio {:.4}, the held-out ones {:.5} Hz and {:.4}. They are of two stands or settings, or the stand \
-             changes with the level",
+            "no single plain stand fits both training and hold-out records: fitted separately, the training records \
+             give {:.5} Hz and damping ratio {:.4}, the hold-out records {:.5} Hz and {:.4}. They are of two stands or \
+             settings, or the stand changes with the level",
             train.natural_hz, train.damping_ratio, holdout.natural_hz, holdout.damping_ratio
         ),
     ))
@@ -213,8 +213,8 @@ fn uncertain_constants(before: &ScoredModel) -> Option<Warning> {
         Warning::new(
             "training-leaves-constants-open",
             format!(
-                "the training records determine {}: the hold-out error may come from that instead of a missing effect; train \
-                 on records that excite the resonance",
+                "the training records determine {}: that, and not a missing effect, may cause the hold-out error; \
+                 train on records that excite the resonance",
                 uncertain.join(" and ")
             ),
         )

@@ -270,8 +270,8 @@ fn gains_differ(
         Warning::new(
             "gain-differs",
             format!(
-                "the known loads give a static gain of {by_loads} {unit}, {} times the {} {unit} that stand file, units or other \
-                 records give: check the calibration and the lever arm of the loads",
+                "the known loads give a static gain of {by_loads} {unit}, {} times the {} {unit} from stand file, \
+                 units or other records: check the calibration and the lever arm of the loads",
                 rounded(gain / known, 4),
                 rounded(known, 6)
             ),
@@ -294,7 +294,7 @@ fn contradicted(
         Warning::new(
             "loads-contradict-effects",
             format!(
-                "the known loads do not bear out {}: the error under the loads is {} times that of a straight line",
+                "the known loads do not confirm {}: the error under the loads is {} times that of a straight line",
                 effects.join(" and "),
                 rounded(ratio.sqrt(), 3)
             ),

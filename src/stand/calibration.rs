@@ -114,8 +114,8 @@ impl RecordedLevels {
         Some(Warning::new(
             "zero-far-from-record",
             format!(
-                "[recorder] zero = \"{}\" is more than {} times as large as anything in the record: the result is an offset of about \
-                 {} {unit} and little else; check the value of the zero and its unit",
+                "[recorder] zero = \"{}\" is more than {} times any sample of the record: the result is little more \
+                 than an offset of about {} {unit}; check the value of the zero and its unit",
                 self.zero,
                 rounded(1.0 / NEAR_NOTHING, 2),
                 rounded(offset * scale, 3)
@@ -134,7 +134,8 @@ impl RecordedLevels {
             Warning::new(
                 "volts-unusual",
                 format!(
-                    "the record reaches {} V, more than bridge amplifiers and recorders give: is it in mV? Then say --unit mV",
+                    "the record reaches {} V, more than bridge amplifiers and recorders output; if it is in mV, give \
+                     --unit mV",
                     rounded(volts.fold(0.0, f64::max), 3)
                 ),
             )
@@ -297,7 +298,7 @@ impl Stand {
             Warning::new(
                 "zero-not-used",
                 format!(
-                    "[recorder] zero of {} is in {} and the record in {}: it was not subtracted",
+                    "[recorder] zero of {} is in {}, but the record is in {}: the zero was not subtracted",
                     self.file,
                     of.usual_unit().0,
                     named.text

@@ -20,7 +20,7 @@ pub(super) fn unusual_modulus(beam: &BeamDrawing) -> Option<Warning> {
         Warning::new(
             "modulus-unusual",
             format!(
-                "[beam] elastic_modulus is {} GPa, which no usual beam has: steel has 200 GPa; check its unit",
+                "[beam] elastic_modulus is {} GPa, unlike any common beam material: steel has 200 GPa; check its unit",
                 short(modulus_pa / 1e9)
             ),
         )

@@ -172,8 +172,8 @@ impl Stand {
                 ErrorCode::NotInvertible,
                 format_args!(
                     "the effect \"{}\" acts at the gage, and how far it moves each mode there does not follow from \
-                     residues of both signs; give shape_at_load and shape_at_gage of [[modes]] in place of residue, \
-                     or leave the effect out",
+                     residues of both signs; give shape_at_load and shape_at_gage of [[modes]] instead of residue, or \
+                     leave the effect out",
                     torque.effect.name
                 ),
             )

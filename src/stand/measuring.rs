@@ -28,8 +28,8 @@ pub(super) fn unusual_gage_factor(gage: &GageData) -> Option<Warning> {
         Warning::new(
             "gage-factor-unusual",
             format!(
-                "[gage] gage_factor is {}, which no usual gage has: metal foil has about 2, semiconductors 50 to 180; a torque \
-                 from this gage is as much too large or too small",
+                "[gage] gage_factor is {}, unlike any common gage: metal foil has about 2, semiconductors 50 to 180; \
+                 the torque is wrong by the same factor",
                 short(factor)
             ),
         )

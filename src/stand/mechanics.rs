@@ -87,8 +87,8 @@ impl Mechanics {
             Warning::new(
                 "residues-do-not-add-up",
                 format!(
-                    "{file}: the residues of [[modes]] add up to {}, so that {} of the response at rest is left to \
-                     modes above the band; check them: residues are fractions of 1",
+                    "{file}: the residues of [[modes]] add up to {}, which leaves {} of the static response to modes \
+                     above the band; check them: residues are fractions of 1",
                     short(1.0 - left),
                     short(left)
                 ),

@@ -59,8 +59,8 @@ impl Stand {
             law.warnings.push(Warning::new(
                 "calibration-not-used",
                 format!(
-                    "the channel \"{channel}\" is in {}, and [calibration] of {} is in {}: the record was taken through the \
-                     beam's drawing; record in {} to use the calibration",
+                    "the channel \"{channel}\" is in {}, and [calibration] of {} is in {}: the record was converted \
+                     with the beam's dimensions; record in {} to use the calibration",
                     named.text,
                     self.file,
                     measured.signal.usual_unit().0,

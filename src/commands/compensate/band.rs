@@ -162,8 +162,8 @@ impl BandReport {
         Some(Warning::new(
             "lines-decide-band",
             format!(
-                "the band reaches {} Hz only because of {which} at {} Hz: {} {unit} rms of the result. If that is picked up \
-                 (a converter that switches, say) and no torque, give --band {}",
+                "the band extends to {} Hz only because of {which} at {} Hz: {} {unit} rms of the result. If that is \
+                 interference (from a switching converter, say) and not torque, give --band {}",
                 short(self.top_hz),
                 rounded(lines.frequency_hz, 4),
                 rounded(of_lines, 3),

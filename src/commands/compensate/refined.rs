@@ -213,8 +213,8 @@ fn describe(report: &mut CompensateReport, undone: &InverseResult, scales: &Scal
         report.warnings.push(Warning::new(
             "phase-hidden",
             format!(
-                "the signal at {} Hz hides the phase of the line there: only {} % of its amplitude was removed; \
-                 record without excitation at this frequency",
+                "the signal at {} Hz masks the phase of the line there: only {} % of its amplitude was removed; record \
+                 without excitation at this frequency",
                 rounded(line.frequency_hz, 5),
                 rounded(100.0 * line.share, 2)
             ),
@@ -225,7 +225,7 @@ fn describe(report: &mut CompensateReport, undone: &InverseResult, scales: &Scal
             "direction-unknown",
             format!(
                 "over {} % of the record the speed is not significantly different from zero: the direction of the \
-                 friction, and so its part of the torque, is unknown there",
+                 friction, and so its share of the torque, is unknown there",
                 rounded(100.0 * stuck, 2)
             ),
         ));

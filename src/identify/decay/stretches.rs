@@ -280,8 +280,8 @@ impl Cuts {
 }
 
 /// What a restart means where its parts are decays of their own.
-const OWN_PARTS: &str = "the parts before and after that are fitted as decays of their own; hit once and take your hand off the \
-                         stand";
+const OWN_PARTS: &str = "the parts before and after are fitted as separate decays; hit once, and keep your hands off \
+    the stand";
 
 /// Times at which a decay of a record starts again.
 pub(super) fn restarts_s(record: &Ringing) -> Vec<f64> {
@@ -329,8 +329,8 @@ fn clipped_times(record: &Ringing, result: &mut Identification) -> Vec<f64> {
         result.warn(
             "clipped",
             format!(
-                "{}: the first peaks of the decay are flat, as of an amplifier that was overdriven before its filter: the \
-                 decay is fitted behind them; tap more softly, or set a smaller gain",
+                "{}: the first peaks of the decay are flat, as from an amplifier overdriven before its filter: the \
+                 decay is fitted after them; tap more gently, or use a smaller gain",
                 record.name
             ),
         );

@@ -444,7 +444,7 @@ fn report_noise(result: &mut Identification, name: &str, found: &frf::Periodic) 
         result.warn(
             "nonlinear",
             format!(
-                "{name}: the response has more power at frequencies that were not applied than noise explains ({} dB): \
+                "{name}: at frequencies that were not excited the response has more power than noise explains ({} dB): \
                  the stand is nonlinear at this level",
                 decibel(others)
             ),

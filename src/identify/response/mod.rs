@@ -218,8 +218,9 @@ fn without_undamped(
     }
 }
 
-const ONE_HIT: &str = "one hit does not show the error of its own force (noise, and what is folded), which decides the \
-    uncertainties here: those of frequency and damping are upper limits, that of the static gain can be too small; take several hits";
+const ONE_HIT: &str = "a single hit does not show the error of its force (noise and aliasing), which dominates the \
+    uncertainties: those of frequency and damping are upper limits, that of the static gain may be too small; take \
+    several hits";
 
 /// The final fit: of the whole records without a window where windows have leakage, or of the averaged response.
 fn final_fit(
