@@ -623,7 +623,7 @@ fn a_mark_for_no_value_is_said_wherever_it_is() {
     for more in [&[][..], &["--whole-record"]] {
         let report = folder.json(&[&COMPENSATE[..], more, &["--force", "--json"]].concat());
         let warnings = report["warnings"].to_string();
-        assert!(warnings.contains("a sample stands alone"), "{warnings}");
+        assert!(warnings.contains("one isolated sample"), "{warnings}");
         assert!(warnings.contains("196.607 s"), "{warnings}");
     }
 }

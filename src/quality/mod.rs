@@ -70,10 +70,7 @@ pub fn constant(channels: &[(&str, f64)]) -> Warning {
         .map(|(name, value)| format!("\"{name}\" is always {}", crate::print::short(*value)));
     Warning::new(
         "constant-channel",
-        format!(
-            "{}: not connected, not selected, or nothing happened",
-            join(named)
-        ),
+        format!("{}: not connected, not selected, or no signal", join(named)),
     )
 }
 

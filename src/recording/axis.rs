@@ -32,7 +32,7 @@ pub const REVERSED: &str =
 /// What is assumed of stamps in a column or vector, of whose unit the file says nothing, or nothing of use.
 pub fn seconds_assumed(name: &str, unit: Option<&str>) -> String {
     let says = match unit {
-        Some(unit) => format!("gives the unit \"{unit}\", which is none of time"),
+        Some(unit) => format!("gives the unit \"{unit}\", which is not a unit of time"),
         None => "gives no unit".to_owned(),
     };
     format!("\"{name}\" {says}: seconds were assumed")

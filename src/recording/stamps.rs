@@ -59,8 +59,8 @@ pub(crate) fn same_stamps(rows: f64) -> String {
     let whole = rows.round();
     match (2.0..=MOST_COPIES).contains(&whole) && (rows / whole - 1.0).abs() < 1e-6 {
         true => format!(
-            "; each stamp stands in {whole} rows: if these repeat their values, too, every row was written {whole} times, and \
-             only one of each belongs to the record"
+            "; each stamp occurs in {whole} rows: if these also repeat their values, every row was written {whole} \
+             times, and only one of each belongs to the record"
         ),
         false => String::new(),
     }
@@ -217,8 +217,8 @@ impl StampGrid {
             Warning::new(
                 "rounded-time-stamps",
                 format!(
-                    "{source}: the time stamps are rounded to {} s; but for that they are uniform, and all of them \
-                     together give {} Hz (to within {} Hz){}",
+                    "{source}: the time stamps are rounded to {} s; apart from that they are uniform, and together \
+                     they give {} Hz (to within {} Hz){}",
                     digits::text(self.quantum * of_seconds, 3),
                     digits::text(rate_hz, 9),
                     digits::text(rate_hz * self.quantum / span, 2),
@@ -331,9 +331,8 @@ impl StampGrid {
         let (before, after) = (time(found.before), time(found.after));
         if found.after < found.before {
             return format!(
-                "time runs backwards, from {before} to {after}: the clock was set \
-                 back, two recordings were joined, or rows were written twice; split the file there, or remove the rows that \
-                 are there already"
+                "time runs backwards, from {before} to {after}: the clock was set back, two recordings were joined, or \
+                 rows were written twice; split the file there, or remove the duplicate rows"
             );
         }
         if found.after == found.before {

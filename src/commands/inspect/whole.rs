@@ -91,7 +91,7 @@ pub fn warning(channels: &[Channel], all: &[Option<AllSamples>]) -> Option<Warni
         "first-samples-only",
         format!(
             "{} too long to be kept in memory: samples, duration, range, mean, rms and missing numbers are those of \
-             all samples, all other checks cover the first ones ({kept} of {samples} in the longest)",
+             all samples; all other checks cover the first ones ({kept} of {samples} in the longest)",
             plural(long.len(), "channel"),
         ),
     ))

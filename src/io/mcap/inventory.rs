@@ -372,7 +372,7 @@ impl Scan {
         for channel in channels {
             if channel.out_of_order > 0 {
                 let message = format!(
-                    "{}: {} of {} messages were logged before the one in front of them",
+                    "{}: {} of {} messages were logged before the preceding one",
                     channel.topic, channel.out_of_order, channel.messages
                 );
                 say("mcap-out-of-order", message);
@@ -382,7 +382,7 @@ impl Scan {
             }
         }
         if self.broken > 0 {
-            let message = format!("{} message records are cut short", self.broken);
+            let message = format!("{} message records are truncated", self.broken);
             say("mcap-skipped", message);
         }
         warnings.extend(summary::conflict(self.channels.conflicts));

@@ -151,7 +151,7 @@ mod tests {
 
     #[test]
     fn a_part_of_samples_repeated_at_random_is_found() {
-        // 30 % of the samples repeat the one before, in five-digit text.
+        // 30 % of the samples repeat the previous one, in five-digit text.
         let fresh = noise(9, 20_000);
         let chance = noise(10, 20_000);
         let mut record = vec![fresh[0]];

@@ -205,8 +205,8 @@ fn doubts(object: &TdmsObject, name: &str) -> Option<Warning> {
         changed => Some(Warning::new(
             "restarted",
             format!(
-                "\"{name}\": {changed} changes within the file: the recording was restarted, and the samples lie as if \
-                 it had not been; save each part in a separate file if the times matter"
+                "\"{name}\": {changed} changes within the file: the recording was restarted, but the samples are timed \
+                 as if it had not been; save each part in a separate file if the times matter"
             ),
         )),
     }
