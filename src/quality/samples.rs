@@ -161,7 +161,7 @@ fn non_finite_cells(name: &str, found: &NonFinite, axis: &TimeAxis, holes: &[Hol
         (HoleKind::NonFinite, "NaN or infinite"),
         (
             HoleKind::InstrumentsMark,
-            "with 9.91e37 or \u{b1}9.9e37, which instruments write for no value or over-range",
+            "with 9.91e37 or \u{b1}9.9e37, which instruments write for no value or over range",
         ),
         (HoleKind::Text, "text"),
     ];

@@ -79,7 +79,7 @@ impl Recording {
         let marks = holes.iter().filter(is_mark).count();
         if let Some(warning) = warning.as_mut().filter(|_| marks > 0) {
             warning.message += &format!(
-                "; {} read 9.91e37 or \u{b1}9.9e37, which instruments write for no value or over-range",
+                "; {} read 9.91e37 or \u{b1}9.9e37, which instruments write for no value or over range",
                 plural(marks, "cell")
             );
         }
