@@ -167,7 +167,9 @@ const AFTER_A_CHANGE: &str =
 /// The records that show a torque over the displacement, or one over the speed.
 pub fn shows_torque(over_displacement: bool) -> &'static str {
     match over_displacement {
-        true => "a slow load and unload over the whole range, and the response at two more levels",
+        true => {
+            "slow loading and unloading over the whole range, and the response at two more levels"
+        }
         false => "free decays from several amplitudes, and the response at two more levels",
     }
 }

@@ -1,11 +1,11 @@
 //! Hysteresis with memory, smooth, of joints and clamps.
 //!
 //! `n = k z`, `z' = x' − (b |x'| z + c x' |z|)` (`linear`; `shown`: the gage shows it), or with `m` in place of 1
-//! (`exponent`): `z' = x' − |s z|^m (b |x'| sgn z + c x')/s`, `s = b + |c|`. In `part` and `exponent-part` a share of the
-//! stand's own stiffness has it, `n = k (z − x)`: the record is then the whole stiffness times the displacement. Y. K. Wen, *Method for random vibration of
-//! hysteretic systems*, J. Eng. Mech. Div. 102 (1976), 249. **Valid without drift of the loops**; does
-//! not close small inner loops as metals do. Mistaken for `coulomb-friction` (its limit for a stiff joint),
-//! `structural-damping` at one level.
+//! (`exponent`): `z' = x' − |s z|^m (b |x'| sgn z + c x')/s`, `s = b + |c|`. In `part` and `exponent-part` a share of
+//! the stand's own stiffness has it, `n = k (z − x)`: the record is then the whole stiffness times the displacement. Y.
+//! K. Wen, *Method for random vibration of hysteretic systems*, J. Eng. Mech. Div. 102 (1976), 249. **Valid for loops
+//! that do not drift**; does not close small inner loops as metals do. Mistaken for `coulomb-friction` (its limit for a
+//! stiff joint), `structural-damping` at one level.
 //!
 //! The law does not depend on rate: `z` follows the steps of `x`, by the midpoint rule.
 
@@ -33,13 +33,12 @@ const STARTS: &[&[f64]] = &[
 pub(super) static EFFECT: Effect = Effect {
     name: "bouc-wen-hysteresis",
     equation: "n = k z, z' = x' - b |x'| z - c x' |z|",
-    meaning: "A joint or clamp slips a little each time the motion turns, and its torque depends on where the \
-              motion came from.",
+    meaning: "A joint or clamp slips slightly at each reversal, and its torque depends on the history of the motion.",
     remedy: "Clean and tighten clamps and bolts, or weld or glue the joint that slips.",
     source: "Y. K. Wen, J. Eng. Mech. Div. 102 (1976), 249",
-    validity: "without drift of the loops",
+    validity: "for loops that do not drift",
     mistaken_for: &["coulomb-friction", "backlash", "structural-damping"],
-    experiment: "a slow load and unload with inner loops, at two rates",
+    experiment: "slow loading and unloading with inner loops, at two rates",
     forms: &[
         Form {
             name: "linear",

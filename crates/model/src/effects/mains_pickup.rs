@@ -1,8 +1,8 @@
 //! Hum of the mains in the record.
 //!
-//! A line at 50 or 60 Hz (`orders`: and its orders 2 to 5), added to the record; the phase belongs to the record,
-//! the frequency is that of the grid within ¼ %. **Valid for a steady grid.** Mistaken for an order of the shaft
-//! (`rotor-imbalance`) that falls on the same frequency.
+//! A line at 50 or 60 Hz (`orders`: and its orders 2 to 5), added to the record; the phase belongs to the record, the
+//! frequency is that of the grid within ¼ %. **Valid for a constant mains frequency.** Mistaken for an order of the
+//! shaft (`rotor-imbalance`) that falls on the same frequency.
 
 use super::lines::SpectralLine;
 use super::{Action, Effect, EffectParameter, Form, ParameterScale, Stage};
@@ -34,9 +34,9 @@ pub(super) static EFFECT: Effect = Effect {
     meaning: "The mains add a line at their frequency, and often at its multiples, to the record.",
     remedy: "Shield the gage's cable, keep it away from power cables, and ground the stand at one point only.",
     source: "the definition",
-    validity: "for a steady grid",
+    validity: "for a constant mains frequency",
     mistaken_for: &["rotor-imbalance"],
-    experiment: "a record with the motor off, or at another speed: the mains stay",
+    experiment: "a record with the motor off, or at another speed: the mains lines stay",
     forms: &[
         form!("60-Hz", 60.0, "amplitude"),
         form!("50-Hz", 50.0, "amplitude"),

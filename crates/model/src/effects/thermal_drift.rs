@@ -1,11 +1,10 @@
 //! A zero or a sensitivity that moves with temperature.
 //!
-//! `linear`: `y = x + d t`; `exponential`: `y = x + D (1 − e^{−t/τ})`, a body that warms up; `sensitivity`:
-//! `y = (1 + g t) x`. `t` is the time since the record began.
-//! `course`: any slow course, of up to eight half waves over the record; like the phase of a line it belongs to the
-//! record and is found anew in each. Thesis, Appendix B: "temperatures … not large enough" for the
-//! gage factor; as a zero shift 2 % of resistance at 85 °F is. **Valid over one warm-up.** Mistaken for `ac-coupled` of
-//! `capacitive-coupling`, a slow disturbance.
+//! `linear`: `y = x + d t`; `exponential`: `y = x + D (1 − e^{−t/τ})`, a body that warms up; `sensitivity`: `y = (1 + g
+//! t) x`. `t` is the time since the record began. `course`: any slow course, of up to eight half waves over the record;
+//! like the phase of a line it belongs to the record and is found anew in each. Thesis, Appendix B: "temperatures … not
+//! large enough" for the gage factor; as a zero shift 2 % of resistance at 85 °F is. **Valid during a single warm-up.**
+//! Mistaken for `ac-coupled` of `capacitive-coupling`, a slow disturbance.
 
 use std::f64::consts::PI;
 
@@ -20,12 +19,12 @@ const HALF_WAVES: usize = 8;
 pub(super) static EFFECT: Effect = Effect {
     name: "thermal-drift",
     equation: "y = x + d t, or x + D (1 - e^(-t/tau)), or (1 + g t) x",
-    meaning: "Zero or sensitivity changes while gage, bridge or amplifier warm up.",
-    remedy: "Let everything warm up before the record, use a full bridge, and record the zero before and after.",
+    meaning: "Zero or sensitivity drifts while gage, bridge or amplifier warm up.",
+    remedy: "Let everything warm up before recording, use a full bridge, and record the zero before and after.",
     source: "T. P. Hertel's thesis, Appendix B",
-    validity: "over one warm-up",
+    validity: "during a single warm-up",
     mistaken_for: &["capacitive-coupling"],
-    experiment: "a record at constant load over several times the length",
+    experiment: "a record at constant load, several times as long",
     forms: &[
         Form {
             name: "linear",
@@ -67,7 +66,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "course",
-            law: "y = x + any slow course, of up to eight half waves over the record",
+            law: "y = x + any slow drift, of up to eight half waves over the record",
             stage: Stage::Disturbance,
             parameters: &[],
             starts: &[&[]],
