@@ -233,7 +233,7 @@ impl<'a> BatchPlan<'a> {
         }
     }
 
-    /// Recordings worked on at a time.
+    /// Recordings processed in parallel.
     pub(super) fn workers(&self) -> usize {
         let allowed = match self.task.many.jobs {
             Some(jobs) => usize::from(jobs),
