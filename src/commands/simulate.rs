@@ -292,7 +292,7 @@ impl Report for SimulateReport {
             some => some.join(", "),
         };
         let answer = match self.is_steady {
-            true => ", the steady answer to them repeated",
+            true => ", the steady-state response to their repetition",
             false => "",
         };
         format!(

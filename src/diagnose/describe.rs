@@ -58,15 +58,14 @@ pub fn residual(
             100.0 * share.share.min(1.0),
             share.of,
             match is_hidden {
-                true => " (the noise floor, from differences between periods, contains that too)",
+                true => " (the noise floor, from differences between periods, includes that)",
                 false => "",
             }
         ));
     }
     if !found.settled && !found.after.effect_names().is_empty() {
         parts.push(
-            "the effect found switches so fast that the step size of the integration adds to the error; a second effect was not \
-             searched for"
+            "the effect found switches so fast that the integration step adds to the error; no second effect was tried"
                 .to_owned(),
         );
     }
@@ -108,8 +107,8 @@ fn level_dependence(levels: &ExcitationLevels) -> Option<String> {
     let differ = |ratio: f64, factor: f64| ratio.ln().abs() > factor.ln();
     (differ(level, LEVELS_DIFFER) && differ(error, ERRORS_DIFFER)).then(|| {
         format!(
-            "the plain stand has an error of {} on the training records and {} on the held-out ones, at {} times the \
-             excitation: what it lacks depends on amplitude",
+            "the plain stand has an error of {} on the training records and {} on the hold-out records, at {} times \
+             the excitation: the missing effect depends on amplitude",
             relative(levels.train_relative, 3),
             relative(levels.holdout_relative, 3),
             rounded(level, 3)
@@ -161,8 +160,7 @@ pub fn next_experiment(
 }
 
 /// What to record where the stand has changed.
-const AFTER_A_CHANGE: &str =
-    "look at clamps, bolts and what else may have moved at that moment, then record the same again";
+const AFTER_A_CHANGE: &str = "check clamps, bolts and anything else that may have moved at that moment, then repeat the record";
 
 /// The records that show a torque over the displacement, or one over the speed.
 pub fn shows_torque(over_displacement: bool) -> &'static str {

@@ -23,7 +23,7 @@ pub struct DetectionLimit {
     pub form: &'static str,
     /// The parameter that says how much of the effect there is.
     pub parameter: &'static str,
-    /// Its magnitude from which on, or up to which, the effect shows; `null` if no physical amount does.
+    /// Its magnitude from which on, or up to which, the effect shows; `null` if no physically possible amount does.
     pub value: Option<f64>,
     /// Unit of `value`; empty for a ratio.
     pub unit: String,

@@ -170,9 +170,7 @@ impl Reason {
                 100.0 * explained.max(0.0)
             ),
             Self::NotConfirmed { change } => not_confirmed(&percent(*change)),
-            Self::Diverges => {
-                "the motion that it gives diverges on the held-out records".to_owned()
-            }
+            Self::Diverges => "its motion diverges on the hold-out records".to_owned(),
             Self::NoneAccepted => "no effect is accepted".to_owned(),
         }
     }
@@ -180,10 +178,10 @@ impl Reason {
 
 /// An effect that explains what only the model has.
 const TAKES_OUT_NOISE: &str =
-    "explains little but the noise of the applied quantity, of which it lets less through";
+    "explains little except the noise of the applied quantity, which it attenuates";
 
 /// What a surface over the motion is.
-const OF_NO_LAW: &str = "a torque of no given law over displacement and speed";
+const OF_NO_LAW: &str = "a torque over displacement and speed without an assumed law";
 
 /// An effect that explains so many percent of the residual power only.
 fn small_share(percent: f64) -> String {
@@ -196,15 +194,15 @@ fn small_share(percent: f64) -> String {
 /// An effect that the held-out records do not bear out.
 fn not_confirmed(change: &str) -> String {
     format!(
-        "reduces the error of the training records, but that of the held-out ones changes by {change} only: not confirmed"
+        "reduces the training error, but the hold-out error changes by only {change}: not confirmed"
     )
 }
 
 /// A further effect that explains too little, with the least parts in percent.
 fn too_little([least, least_of_rest, rest]: [f64; 3]) -> String {
     format!(
-        "explains less than {least:.0} % of what the plain stand leaves above the noise (or less than {least_of_rest:.0} %, and \
-         {rest:.0} % of what is left now): too little for a further effect"
+        "explains less than {least:.0} % of the plain stand's residual above the noise (or less than \
+         {least_of_rest:.0} %, and {rest:.0} % of the present residual): too little for a further effect"
     )
 }
 

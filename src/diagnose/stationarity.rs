@@ -127,10 +127,10 @@ fn with_square(
     beyond_chance(of, &shares, residual_power)
 }
 
-/// The power at the lowest frequencies above that of the noise next to them: a zero that drifts or jumps. The mean is not
-/// part of it. Noise may rise towards them as that of first order does.
+/// The power at the lowest frequencies above that of the noise next to them: a drifting or jumping zero. The mean is
+/// not part of it. Noise may rise towards them as that of first order does.
 pub fn wandering_zero(residuals: &[RecordResidual]) -> PowerShare {
-    const OF: &str = "a zero that drifts or jumps";
+    const OF: &str = "a drifting or jumping zero";
     let (mut excess, mut total, mut variance) = (0.0, 0.0, 0.0);
     for residual in residuals {
         let spectrum = spectra(&residual.samples, residual.samples.len()).power();

@@ -130,12 +130,12 @@ impl BandReport {
             BandSource::Option => "as given".to_owned(),
             BandSource::Rated => "the rated band".to_owned(),
             BandSource::Stand => format!(
-                "chosen from the stand alone, up to a gain of 10, because the first {} s do not rise above their noise",
+                "chosen from the stand alone, up to a gain of 10, because the signal in the first {} s is below the \
+                 noise",
                 length(self.seconds)
             ),
             BandSource::HeldSamples => {
-                "a fifth of the rate at which new values come: each is held for several samples"
-                    .to_owned()
+                "a fifth of the rate of new values: each is held for several samples".to_owned()
             }
             BandSource::Record => {
                 "chosen for the least expected error from the record and its noise".to_owned()

@@ -257,7 +257,8 @@ impl CompensateReport {
         ]);
         if self.looked_at < self.samples {
             let looked_at = format!(
-                "clipping and drop-outs were looked for throughout, hum and held values in the first {} samples; inspect looks at more",
+                "clipping and drop-outs were checked throughout, hum and held values in the first {} samples; inspect \
+                 checks more",
                 self.looked_at
             );
             facts.push(fact("quality", looked_at));
@@ -411,7 +412,7 @@ impl CompensateReport {
         if !found.left_out.is_empty() {
             let _ = write!(
                 text,
-                "; {} cannot be moved by the std given",
+                "; {} cannot be varied by the given std",
                 found.left_out.join(", ")
             );
         }
@@ -434,8 +435,8 @@ impl CompensateReport {
 
 fn resampled_text(resampled: &Resampled) -> String {
     format!(
-        "{} samples interpolated to {}; {} filled by straight lines ({} samples, longest step \
-         {} s), {} dropped, jitter up to {} % of a step",
+        "{} samples interpolated to {}; {} filled by linear interpolation ({} samples, longest step {} s), {} dropped, \
+         jitter up to {} % of a step",
         resampled.samples_in,
         resampled.samples_out,
         plural(resampled.gaps, "gap"),

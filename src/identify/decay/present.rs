@@ -191,7 +191,7 @@ fn falls(fit: &ModesFit, stretches: &[Stretch], main: usize) -> f64 {
 
 pub(super) fn method(fit: &ModesFit, stretches: usize) -> String {
     format!(
-        "nonlinear least squares: {} over {}, {} samples, each stretch with an offset and a drift of its own",
+        "nonlinear least squares: {} over {}, {} samples, each stretch with its own offset and drift",
         plural(fit.poles.len(), "decaying sine"),
         plural(stretches, "stretch"),
         fit.fit.residuals.len()
@@ -199,8 +199,8 @@ pub(super) fn method(fit: &ModesFit, stretches: usize) -> String {
 }
 
 /// What is said of a baseline that was taken off.
-pub(super) const BASELINE: &str = "the zero moves while the stand rings (an amplifier that is AC coupled or settles, a part that \
-                                   warms up): it was fitted with a smooth curve and taken off";
+pub(super) const BASELINE: &str = "the zero moves during the decay (an amplifier that is AC coupled or settles, a part \
+    that warms up): it was fitted with a smooth curve and subtracted";
 
 /// Names the decay rates and frequencies that are strongly correlated.
 pub(super) fn correlations(result: &mut Identification, fit: &ModesFit) {

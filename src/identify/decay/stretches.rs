@@ -68,7 +68,7 @@ pub(super) fn stretches(
             format!("{start} to {end} Hz")
         });
         result.method.push(format!(
-            "filtered to {} and decimated to one sample in {}: nothing rings beside that",
+            "filtered to {} and decimated to one sample in {}: no decay outside that band",
             bands.collect::<Vec<_>>().join(", "),
             few.factor
         ));
@@ -250,13 +250,13 @@ impl Cuts {
             .extend(present::restart(&self.restarts_s, OWN_PARTS));
         if left_clipped > 0 {
             result.method.push(format!(
-                "each decay is fitted from its last clipped sample on; {left_clipped} samples before that are left out"
+                "each decay is fitted from its last clipped sample on; {left_clipped} samples before that are excluded"
             ));
         }
         if left_out > 0 {
             result.method.push(format!(
-                "each decay is fitted up to twice the time after which its ringing is lost in the noise; {left_out} samples \
-                 of noise behind that are left out"
+                "each decay is fitted up to twice the time after which it is lost in the noise; {left_out} later \
+                 samples of noise are excluded"
             ));
         }
         if self.stretches.is_empty() {

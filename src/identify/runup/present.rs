@@ -38,13 +38,13 @@ pub(super) fn method(result: &mut Identification, run: &FreeRun, fitted: &Fitted
     let all = fitted.used.len();
     let used = fitted.used.iter().filter(|u| **u).count();
     let which = if used < all {
-        format!("{used} of {all} windows; in the others the body reverses or stands")
+        format!("{used} of {all} windows; in the others the body reverses or is at rest")
     } else {
         format!("{all} windows")
     };
     result.method.push(format!(
-        "least squares on the equation of motion averaged over windows of ±{} s ({which}); the derivatives are those of \
-         the window's weight",
+        "least squares on the equation of motion averaged over windows of ±{} s ({which}); derivatives act on the \
+         window function (weak form)",
         short(fitted.rows.half as f64 / run.rate_hz),
     ));
     if fitted.fit.coloured > COLOURED {

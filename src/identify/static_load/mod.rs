@@ -274,8 +274,8 @@ fn method(result: &mut Identification, fit: &LoadCurve, points: &[Point], unit: 
         "{} regression of the reading on the load over {} points, loading and unloading together{}{}",
         if is_weighted { "weighted" } else { "unweighted" },
         points.len(),
-        if fit.has_even_drift { ", with an even drift of the zero" } else { "" },
-        if fit.has_hysteresis { ", with a hysteresis at each load" } else { "" }
+        if fit.has_even_drift { ", with a linear drift of the zero" } else { "" },
+        if fit.has_hysteresis { ", with hysteresis at each load" } else { "" }
     ));
     let spreads = &fit.spreads;
     let allowed = [
