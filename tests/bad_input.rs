@@ -92,11 +92,7 @@ fn units() {
         unknown.as_bytes(),
         &[],
         1,
-        &[
-            "\"bridge\" does not say its unit",
-            "--unit V",
-            "--unit \"N m\"",
-        ],
+        &["\"bridge\" has no unit", "--unit V", "--unit \"N m\""],
     );
     refused(
         good().as_bytes(),
@@ -108,7 +104,7 @@ fn units() {
         good().as_bytes(),
         &["--unit", "kg"],
         1,
-        &["\"kg\"", "does not become torque"],
+        &["\"kg\"", "cannot be converted to torque"],
     );
     let no_time_unit = good().replace("time_s", "time");
     refused(

@@ -181,7 +181,7 @@ fn a_fundamental_beside_the_line_is_said() {
         let all = orders.chain(more.split(' ')).collect::<Vec<_>>();
         folder.run(&[&HARMONICS[..], &all].concat())
     };
-    refine("--refine").says(1, &["--refine-span searches further than 2 %"]);
+    refine("--refine").says(1, &["--refine-span searches beyond 2 %"]);
     let refined = refine(advice);
     assert!(refined.stdout.contains("29.1"), "{}", refined.stdout);
     for seconds in [2.0, 10.0] {

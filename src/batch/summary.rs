@@ -195,12 +195,12 @@ impl BatchResult<'_> {
         let left_out = &self.plan.left_out;
         if !left_out.is_empty() {
             let names = some_of(left_out, left_out.len());
-            text += &format!("no recordings by their content, left out: {names}\n");
+            text += &format!("no recordings by their content, skipped: {names}\n");
         }
         if self.plan.history.unread > 0 {
             let lines = plural(self.plan.history.unread as u64, "line");
             text += &format!(
-                "{lines} of the manifest cannot be read and say nothing: cut, or of another version\n"
+                "{lines} of the manifest cannot be read and are ignored: truncated, or of another version\n"
             );
         }
         text
@@ -256,7 +256,7 @@ pub(super) fn ended<'a>(
         let others = match not_begun {
             _ if failed == count => String::new(),
             0 => "; the others are done".to_owned(),
-            count => format!(", {count} were not begun"),
+            count => format!(", {count} were not started"),
         };
         return Err(Failure::failed(
             ErrorCode::RecordingsFailed,
@@ -291,7 +291,7 @@ pub(super) fn warnings<'a>(
         .map(|(code, count)| format!("{code} in {count}"));
     let each: Vec<String> = each.collect();
     format!(
-        "warnings: {} (their words are in {place})\n",
+        "warnings: {} (their messages are in {place})\n",
         each.join(", ")
     )
 }
@@ -301,7 +301,7 @@ fn failures<'a>(entries: impl Iterator<Item = &'a ManifestEntry>) -> String {
     let line = |entry: &ManifestEntry| {
         let (word, input) = (word(entry.exit), &entry.input);
         let why = entry.error.as_deref();
-        let why = why.unwrap_or("data were lost, or --strict made a warning count");
+        let why = why.unwrap_or("data were lost, or --strict turned a warning into a failure");
         match why.starts_with(input) {
             true => format!("torqcomp: {word}: {why}\n"),
             false => format!("torqcomp: {word}: {input}: {why}\n"),

@@ -147,8 +147,7 @@ pub(crate) fn template(text: &str) -> Result<String, String> {
     match text.contains("{stem}") || text.contains("{name}") {
         true => Ok(text.to_owned()),
         false => Err(
-            "expected {stem} or {name} in it, so that each recording has a result of its own"
-                .to_owned(),
+            "expected {stem} or {name} in it, so that each recording has its own result".to_owned(),
         ),
     }
 }

@@ -233,7 +233,7 @@ fn refined(
         Error::NotRefined { .. } => Failure::failed(
             ErrorCode::NotIdentifiable,
             format_args!(
-                "{error}; --refine-span searches further than {} % around it",
+                "{error}; --refine-span searches beyond {} % around it",
                 short(args.refine_span)
             ),
         ),
@@ -375,8 +375,8 @@ fn visible_orders(
         return Err(Failure::failed(
             ErrorCode::UnsuitableRecord,
             format_args!(
-                "no order of {} Hz lies below half the sampling rate of {} Hz; ask for lower orders or \
-             record faster",
+                "no order of {} Hz is below half the sampling rate of {} Hz; request lower orders or record at a \
+                 higher rate",
                 short(args.fundamental),
                 short(rate_hz)
             ),

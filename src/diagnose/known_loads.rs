@@ -74,7 +74,7 @@ impl KnownLoads {
             return Err(Failure::failed(
                 ErrorCode::TooFewSamples,
                 format_args!(
-                    "{} different loads are too few; put on at least {FEWEST}, the empty stand included",
+                    "{} different loads are too few; apply at least {FEWEST}, including no load",
                     different.len()
                 ),
             )
@@ -203,7 +203,7 @@ impl Diagnosis {
         if self.context().held.is_some() {
             return Err(Failure::failed(
                 ErrorCode::UnsuitableRecord,
-                "--static does not apply: the body moves freely, and under a load that stays it does not come to rest",
+                "--static does not apply: the body moves freely and does not come to rest under a constant load",
             ));
         }
         let follow = |fitted: &FittedModel| {
@@ -211,8 +211,8 @@ impl Diagnosis {
                 Failure::failed(
                     ErrorCode::NotIdentifiable,
                     format_args!(
-                        "the loads of --static do not give a gain ({error}): the reading does not follow them, or what is recorded \
-                         shows no load that stays"
+                        "the loads of --static do not determine a gain ({error}): the reading does not follow them, or \
+                         the recorded quantity does not show constant loads"
                     ),
                 )
                 .at(&loads[0].source)

@@ -110,7 +110,7 @@ pub(crate) fn check_size(channel: &Channel) -> Result<(), Failure> {
     Err(Failure::failed(
         ErrorCode::InvalidSample,
         format_args!(
-            "sample {} of \"{}\" is {:e}, which no instrument reads; correct it, or leave it out",
+            "sample {} of \"{}\" is {:e}, beyond any instrument; correct or exclude it",
             row + 1,
             channel.name,
             channel.samples[row]

@@ -204,7 +204,7 @@ impl Calibration {
             Failure::failed(
                 ErrorCode::UnitUnclear,
                 format_args!(
-                    "the channel \"{name}\" does not say its unit; give it with --unit \"N m\" (or \"ft lbf\", N)"
+                    "the channel \"{name}\" has no unit; give it with --unit \"N m\" (or \"ft lbf\", N)"
                 ),
             )
         })?;
@@ -369,15 +369,14 @@ fn without_unit(channel: RecordedChannel) -> Failure {
         None => Failure::failed(
             ErrorCode::UnitUnclear,
             format_args!(
-                "the channel \"{name}\" does not say its unit; give it: --unit V for what an amplifier or recorder put out \
-                 (mV/V, mA, Hz, ustrain likewise), --unit \"N m\" (or N) for what is torque (or force) already, as from \
-                 simulate"
+                "the channel \"{name}\" has no unit; give it: --unit V for the output of an amplifier or recorder \
+                 (likewise mV/V, mA, Hz, ustrain), --unit \"N m\" (or N) for a torque (or force), as from simulate"
             ),
         ),
         Some(OF_FULL_SCALE) => Failure::failed(
             ErrorCode::UnitUnclear,
             format_args!(
-                "the samples of the channel \"{name}\" are fractions of full scale, and the file does not say what that is; \
+                "the samples of the channel \"{name}\" are fractions of full scale, which the file does not state; \
                  give it with its unit, as --full-scale \"10 V\""
             ),
         ),
@@ -403,9 +402,9 @@ fn no_torque(channel: &str, named: &NamedUnit) -> Failure {
         return Failure::failed(
             ErrorCode::UnitUnclear,
             format_args!(
-                "the channel \"{channel}\" is in \"{text}\", which could be the output of a bridge over its \
-                 excitation, a strain, or part of a full scale; give --unit \"{text} V/V\" for the first or \"{text} \
-                 strain\" for the second"
+                "the channel \"{channel}\" is in \"{text}\", which could be bridge output over excitation, a strain, \
+                 or a fraction of full scale; give --unit \"{text} V/V\" for the first or \"{text} strain\" for the \
+                 second"
             ),
         );
     }
@@ -421,16 +420,16 @@ fn no_torque(channel: &str, named: &NamedUnit) -> Failure {
         return Failure::failed(
             ErrorCode::UnitUnclear,
             format_args!(
-                "the channel \"{channel}\" is in \"{text}\", which can be read with a force or with a mass; \
-                 {torque}; \"{mass}\" does not become torque"
+                "the channel \"{channel}\" is in \"{text}\", which can be read with a force or with a mass; {torque}; \
+                 \"{mass}\" cannot be converted to torque"
             ),
         );
     }
     Failure::failed(
         ErrorCode::UnitUnsuitable,
         format_args!(
-            "the channel \"{channel}\" is in \"{text}\" ({}), which does not become torque; expected volts, mV/V, \
-             mA, Hz, strain, torque or force",
+            "the channel \"{channel}\" is in \"{text}\" ({}), which cannot be converted to torque; expected volts, \
+             mV/V, mA, Hz, strain, torque or force",
             named.unit.dimension()
         ),
     )

@@ -76,7 +76,7 @@ pub(super) fn beam(section: &Section) -> Result<BeamDrawing, Failure> {
     if !SOLID_PA.contains(&modulus.value()) {
         return Err(section.fail(
             "elastic_modulus",
-            "no solid has such a modulus; steel has \"200 GPa\", aluminium \"70 GPa\"",
+            "impossible modulus; steel has \"200 GPa\", aluminium \"70 GPa\"",
         ));
     }
     let radius = section.positive("radius", Kind::Length)?;

@@ -193,8 +193,8 @@ impl Stand {
             return Err(Failure::failed(
                 ErrorCode::NotInvertible,
                 format_args!(
-                    "the effect \"{}\" is no response over frequency; leave it out to use the plain stand, or take \
-                     it out of the record with compensate",
+                    "the effect \"{}\" has no frequency response; remove it to use the plain stand, or remove its \
+                     effect from the record with compensate",
                     link.effect
                 ),
             )

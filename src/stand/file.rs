@@ -53,7 +53,7 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
         let hint = if text.contains(SCHEMA) {
             ""
         } else {
-            "; this does not look like a stand file, which begins with schema = \"torqcomp.stand/1\""
+            "; this does not look like a stand file, which starts with schema = \"torqcomp.stand/1\""
         };
         source.at(error.span().map(|span| span.start), format_args!("{message}{hint}"))
     })?;
@@ -202,7 +202,7 @@ fn one_calibration(top: &Section, stand: &Stand) -> Result<(), Failure> {
     {
         return Err(top.fail(
             "calibration",
-            format_args!("the sensitivity does not go with the zero of [recorder]: {why}"),
+            format_args!("the sensitivity does not match the zero of [recorder]: {why}"),
         ));
     }
     Ok(())

@@ -82,8 +82,8 @@ pub enum BridgeError {
     },
     /// The search for the strain did not settle.
     #[error(
-        "strain for {got_v} V must settle within {steps} steps, got {strain} at the last; \
-         check the bridge's data for extreme values"
+        "strain for {got_v} V must converge within {steps} steps, got {strain} at the last; check the bridge's data \
+         for extreme values"
     )]
     NotConverged {
         /// Steps allowed.

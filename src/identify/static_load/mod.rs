@@ -115,8 +115,8 @@ pub fn identify(
         return Err(Failure::failed(
             ErrorCode::TooFewSamples,
             format_args!(
-                "{} in {} are too few for a curve of degree {degree} and its error; apply at least {}, the empty stand \
-             included{or}",
+                "{} in {} are too few for a curve of degree {degree} and its error; apply at least {}, including no \
+                 load{or}",
                 plural(count, "different load"),
                 plural(points.len(), "row"),
                 degree + 2
