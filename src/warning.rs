@@ -8,7 +8,7 @@ use serde::Serialize;
 pub struct Warning {
     /// Stable code of the warning.
     pub code: &'static str,
-    /// The warning for people.
+    /// Human-readable message.
     pub message: String,
 }
 

@@ -25,7 +25,7 @@ pub(super) struct FoundFile {
 #[derive(Debug, Default)]
 pub(super) struct Listing {
     pub(super) files: Vec<FoundFile>,
-    /// Files of folders that are no recordings by their content.
+    /// Files in folders whose content is not a recording.
     pub(super) left_out: Vec<String>,
 }
 

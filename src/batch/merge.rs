@@ -32,7 +32,7 @@ pub(crate) struct Merged {
     failed: usize,
     /// Recordings that are in several manifests with the same result, counted once.
     repeated: usize,
-    /// What keeps the runs from being one finished job.
+    /// Why the runs are not one finished job.
     problems: Vec<MergeProblem>,
     /// Lines of the recordings, in the order of folders and names.
     files: Vec<ManifestEntry>,
@@ -45,7 +45,7 @@ struct MergeProblem {
     code: &'static str,
     /// Path of the manifest that the problem is about; `null` if it is about all.
     manifest: Option<String>,
-    /// The problem for people.
+    /// Human-readable message.
     message: String,
 }
 

@@ -26,7 +26,7 @@ pub(super) struct BatchPlan<'a> {
     /// All recordings, of which `files` may be a part.
     pub(super) all: WholeList,
     pub(super) files: Vec<BatchFile>,
-    /// Files of folders that are no recordings by their content.
+    /// Files in folders whose content is not a recording.
     pub(super) left_out: Vec<String>,
 }
 

@@ -54,7 +54,7 @@ pub(super) enum Treated {
 /// A recording in the document of a run.
 #[derive(Serialize, JsonSchema)]
 struct TreatedEntry {
-    /// `made` (worked on, well or not), or `skipped`: the results were there.
+    /// `made` (processed, successfully or not), or `skipped`: the results existed.
     status: &'static str,
     #[serde(flatten)]
     entry: ManifestEntry,
@@ -111,19 +111,19 @@ pub(crate) struct BatchReport<'a> {
     manifest: String,
     /// Number of recordings.
     recordings: usize,
-    /// Recordings that were worked on with success.
+    /// Recordings processed successfully.
     made: usize,
-    /// Recordings whose results were there.
+    /// Recordings whose results existed.
     skipped: usize,
     /// Recordings that failed.
     failed: usize,
-    /// Recordings that were not begun, after failures.
+    /// Recordings not started, after failures.
     not_begun: usize,
     /// Time that the run took, in s.
     seconds: f64,
-    /// Files of folders that are no recordings by their content.
+    /// Files in folders whose content is not a recording.
     left_out: &'a [String],
-    /// Lines of the recordings that were begun, with what became of each.
+    /// Lines of the recordings that were started, with the result of each.
     files: Vec<&'a Treated>,
 }
 

@@ -46,7 +46,7 @@ pub(super) struct HarmonicsReport {
     taken_as: &'static str,
     /// Path of the stand file; `null` for a compensated record.
     stand: Option<String>,
-    /// How the record became torque at rest.
+    /// How the record was converted to static torque.
     calibration: String,
     /// Relative standard uncertainty of the constant of the calibration; `null` if unknown, or if there is none.
     calibration_relative_std: Option<f64>,
@@ -75,7 +75,7 @@ pub(super) struct HarmonicsReport {
     mean: f64,
     /// The component torques, by order.
     components: Vec<ComponentTorque>,
-    /// Rms of what the fit leaves of the record, in `unit`.
+    /// Rms of the residual, in `unit`.
     residual_rms: f64,
     /// Warnings, each with a stable code.
     warnings: Vec<Warning>,
@@ -94,11 +94,11 @@ struct ComponentTorque {
     recorded: f64,
     /// Phase of the recorded component, in degrees.
     recorded_phase_deg: f64,
-    /// Amplitude that acted over the recorded amplitude.
+    /// Applied over recorded amplitude.
     factor: f64,
-    /// Amplitude of the torque that acted, in `unit`.
+    /// Amplitude of the applied torque, in `unit`.
     torque: f64,
-    /// Phase of the torque that acted, in degrees.
+    /// Phase of the applied torque, in degrees.
     phase_deg: f64,
     /// Standard uncertainty of `torque` from the noise of the record, in `unit`.
     std: f64,

@@ -32,9 +32,9 @@ pub(super) struct SimulateReport {
     applied_unit: String,
     /// Unit of the simulated record.
     measured_unit: String,
-    /// Course that the input takes between samples.
+    /// Behaviour of the input between samples.
     input_between_samples: &'static str,
-    /// Whether the record is the steady answer to an input that repeats.
+    /// Whether the record is the steady-state response to a periodic input.
     is_steady: bool,
     /// Number of samples.
     samples: usize,

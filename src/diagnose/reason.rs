@@ -252,7 +252,7 @@ fn percent(change: f64) -> String {
 struct StatedReason {
     /// Whether the effect is added to the model.
     status: Status,
-    /// Why the effect is added, or is not.
+    /// Why the effect is or is not added.
     why: String,
 }
 

@@ -129,7 +129,7 @@ fn missing(whose: &str, axis: &TimeAxis) -> Option<Warning> {
         // A list that no message fills has nothing that a rate could be of.
         Some([]) => return None,
         Some(stamps) if falls(stamps) => REVERSED.to_owned(),
-        Some(_) => format!("the time stamps have no typical step; {given}"),
+        Some(_) => format!("the time stamps have no usual step; {given}"),
         None => format!("the file has neither time stamps nor a rate; {given}"),
     };
     let message = format!("{whose}: the sampling rate is unknown, because {why}");

@@ -23,7 +23,7 @@ const LONGEST: f64 = 10_000.0;
 pub struct FilledSpan {
     /// Time of the sample before it, in s.
     pub from_s: f64,
-    /// Time of the sample behind it, in s.
+    /// Time of the sample after it, in s.
     pub to_s: f64,
     /// Samples that were filled in.
     pub samples: usize,

@@ -117,7 +117,7 @@ impl Band {
         self.top_hz
     }
 
-    /// Frequency from which on nothing is passed, in Hz.
+    /// Frequency above which nothing is passed, in Hz.
     #[must_use]
     pub fn end_hz(&self) -> f64 {
         self.end_hz

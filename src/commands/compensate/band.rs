@@ -29,7 +29,7 @@ const MATTERS: f64 = 0.02;
 pub(super) struct BandReport {
     /// End of the part that is compensated in full.
     pub(super) top_hz: f64,
-    /// Frequency from which on nothing is passed.
+    /// Frequency above which nothing is passed.
     pub(super) end_hz: f64,
     pub(super) chosen_from: BandSource,
     /// Length of the part of the record that the band was chosen from, in s; `null` if it was not chosen.

@@ -59,7 +59,7 @@ pub struct Route {
     pub slice: Slice,
     /// What must be found first.
     pub lookup: Option<Lookup>,
-    /// FieldKind of number.
+    /// Kind of number.
     pub number: Number,
     /// Unit as the definition states it.
     pub unit: Option<String>,

@@ -38,7 +38,7 @@ pub struct Link {
     pub effect: &'static str,
     /// Its form.
     pub form: &'static str,
-    /// Where it sits.
+    /// Its location.
     pub stage: Stage,
     /// What it does.
     pub action: Action,

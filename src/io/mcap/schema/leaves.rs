@@ -10,7 +10,7 @@ pub const MOST: usize = 1000;
 pub struct Leaf {
     /// Path as a user writes it, lists with `[]`, arrays with `[3]`.
     pub path: String,
-    /// FieldKind of number.
+    /// Kind of number.
     pub number: Number,
     /// Unit as the definition states it.
     pub unit: Option<String>,
