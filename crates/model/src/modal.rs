@@ -23,7 +23,7 @@ use crate::mode::Mode;
 pub struct ModalPart {
     /// The mode.
     pub mode: Mode,
-    /// `r`: its part of the response at rest.
+    /// `r`: its fraction of the static response.
     pub residue: f64,
     /// `q`: the part of its residue that goes with the speed.
     pub quadrature: f64,
