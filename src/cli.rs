@@ -68,7 +68,7 @@ pub struct Cli {
 /// The verbs.
 #[derive(Debug, Subcommand)]
 pub enum Verb {
-    /// Write a commented stand file for what you have
+    /// Write a commented stand file from the data you have
     Init(Box<init::Init>),
     /// Convert a recorded signal to the applied torque
     Compensate(Compensate),
@@ -76,21 +76,21 @@ pub enum Verb {
     Harmonics(Harmonics),
     /// Tabulate the inverse transfer function over frequency
     Table(Table),
-    /// Calculate stand constants from the drawing, beside the measured ones
+    /// Calculate stand constants from the drawing and compare them with the measured ones
     Predict(Predict),
     /// Write one channel of a recording as plain rows of time and value
     Extract(Extract),
-    /// List the channels of recordings and what is wrong with them
+    /// List the channels of recordings and their problems
     Inspect(Inspect),
     /// Identify stand constants from records, with their uncertainties
     Identify(identify::Identify),
     /// Simulate the stand's response to a given input
     Simulate(Simulate),
-    /// Find the effects that a stand model lacks, with the error before and after
+    /// Find effects missing from a stand model, with the error before and after
     Diagnose(Diagnose),
     /// Join the manifests of several runs over many recordings into one table
     Merge(Merge),
-    /// Print the script that completes the command line in a shell
+    /// Print a command-line completion script for a shell
     Completions(Completions),
     /// Print the manual page of the program or of a verb
     Man(Man),
@@ -182,7 +182,7 @@ pub struct OutputArgs {
     /// Replace the output if it exists
     #[arg(long)]
     pub force: bool,
-    /// Leave it to the system when outputs reach the disk: quicker, but a power cut may leave empty files
+    /// Do not sync outputs to the disk: faster, but a power cut may leave empty files
     #[arg(long)]
     pub no_sync: bool,
 }
@@ -241,7 +241,7 @@ pub struct Strictness {
     /// Exit with code 3 if there are warnings
     #[arg(long)]
     pub strict: bool,
-    /// Warning that --strict lets pass, by its code; may be given several times
+    /// Code of a warning that --strict ignores; may be given several times
     #[arg(long, value_name = "CODE", value_parser = warning_code)]
     pub allow: Vec<String>,
 }
@@ -285,7 +285,7 @@ pub struct Compensate {
     /// Add the recorded torque, before compensation, as a third column
     #[arg(long)]
     pub with_recorded: bool,
-    /// Transform the record as a whole in memory instead of as a stream
+    /// Process the record as a whole in memory instead of as a stream
     #[arg(long)]
     pub whole_record: bool,
     /// Plot the recorded and the compensated torque to an SVG file
@@ -343,7 +343,7 @@ pub struct Harmonics {
     /// Fundamental frequency
     #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive_frequency)]
     pub fundamental: f64,
-    /// Orders of the fundamental: ranges and single ones, as in 1-20 or 0.5,1,2
+    /// Orders of the fundamental: ranges and single orders, as in 1-20 or 0.5,1,2
     #[arg(long, value_name = "LIST", default_value = "1-20", value_parser = orders)]
     pub orders: Orders,
     /// Estimate the fundamental from the data, near the given one

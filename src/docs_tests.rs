@@ -71,8 +71,8 @@ fn section(page: &mut String, effect: &Effect) {
     };
     write!(
         page,
-        "\n## {}\n\n{} {}\n\nSource: {}. Valid {}. Mistaken for {}. To tell them apart: {}.\n\n\
-         | form | equation | where | parameters, unit, bounds | compensate |\n|---|---|---|---|---|\n",
+        "\n## {}\n\n{} {}\n\nSource: {}. Valid {}. Mistaken for {}. To distinguish them: {}.\n\n| form | equation | \
+         where | parameters, unit, bounds | compensate |\n|---|---|---|---|---|\n",
         effect.name,
         effect.meaning,
         effect.remedy,

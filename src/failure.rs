@@ -245,7 +245,7 @@ impl Fault {
 /// Name and version of the document of a failure.
 pub const SCHEMA: &str = "torqcomp.error/1";
 
-/// A failure, printed in the place of a report.
+/// A failure, printed in place of a report.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ErrorDocument<'a> {
     /// Why the command failed.
@@ -257,12 +257,12 @@ pub struct ErrorDocument<'a> {
 pub struct ErrorReport<'a> {
     /// Kind of the failure.
     code: ErrorCode,
-    /// What is wrong, in words that may change.
+    /// Human-readable message; its wording may change.
     message: &'a str,
-    /// Where the failure is; `null` if that is no single place.
+    /// Location of the failure; `null` if there is no single one.
     #[serde(rename = "where")]
     place: Option<&'a ErrorPlace>,
-    /// What was expected, or what to do; `null` if the message says it all.
+    /// What was expected, or what to do; `null` if the message is sufficient.
     hint: Option<&'a str>,
 }
 

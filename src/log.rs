@@ -31,7 +31,7 @@ struct Log {
     broken: Option<Failure>,
 }
 
-/// An event of a run. A run without the event `end` was killed, or is under way.
+/// An event of a run. A run without the event `end` was killed, or is still running.
 #[derive(Serialize, JsonSchema)]
 pub(crate) struct LogLine<'a> {
     /// Name and version of the form of this line.
@@ -40,7 +40,7 @@ pub(crate) struct LogLine<'a> {
     version: &'static str,
     /// Date and time in UTC (ISO 8601).
     time: String,
-    /// The run: the same in all of its lines, and of no other run on this machine.
+    /// Identifier of the run, the same in all of its lines and unique on this machine.
     run: &'a str,
     #[serde(flatten)]
     event: LogEvent<'a>,
@@ -54,16 +54,16 @@ enum LogEvent<'a> {
     Start {
         /// The command line, the program first.
         command: Vec<String>,
-        /// The folder that paths start from; `null` if unknown.
+        /// Folder that paths are relative to; `null` if unknown.
         folder: Option<String>,
     },
     /// A warning.
     Warning {
-        /// The recording among many that it is about; `null` of a run over one.
+        /// The recording concerned; `null` in a run over a single one.
         file: Option<&'a str>,
         /// Stable code of the warning.
         code: &'a str,
-        /// The warning for people.
+        /// Human-readable message.
         message: &'a str,
     },
     /// A failure, of the run or of a recording among many.

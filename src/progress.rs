@@ -191,28 +191,28 @@ impl Drop for Progress {
     }
 }
 
-/// How far a task has got: a line on standard error with `--progress json`, at most one in half a second.
+/// Progress of a task: a line on standard error with `--progress json`, at most one in half a second.
 #[derive(Serialize, JsonSchema)]
 pub(crate) struct ProgressLine<'a> {
-    /// Share that is done, from 0 to 1; `null` if it is unknown how much there is.
+    /// Fraction done, from 0 to 1; `null` if the total is unknown.
     progress: Option<f64>,
     /// Name and version of the form of this line.
     schema: &'static str,
-    /// What is under way: `read` (a file), `recordings` (many, each by itself) or `fits` (of models).
+    /// Current task: `read` (a file), `recordings` (many, each by itself) or `fits` (of models).
     task: &'static str,
-    /// Name of the file that is read; `null` of other tasks.
+    /// Name of the file being read; `null` for other tasks.
     file: Option<&'a str>,
-    /// Recordings or fits that are done; `null` of a file that is read.
+    /// Recordings or fits done; `null` for a file being read.
     done: Option<u64>,
     /// Recordings or fits in all; `null` if unknown.
     total: Option<u64>,
-    /// Bytes read, or in the recordings that are done; `null` of fits.
+    /// Bytes read, or in the recordings done; `null` for fits.
     bytes_done: Option<u64>,
     /// Bytes in all; `null` if unknown.
     bytes_total: Option<u64>,
     /// Time since the task began, in s.
     seconds: f64,
-    /// Time to come at the same pace, in s; `null` if unknown.
+    /// Estimated time remaining, in s; `null` if unknown.
     seconds_left: Option<f64>,
 }
 

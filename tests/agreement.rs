@@ -66,7 +66,7 @@ const REASONS: [(&str, &[&str]); 5] = [
             "the sampling rate of",
             "gives no unit",
             "allow any rate",
-            "does not say its unit",
+            "has no unit",
             "none is known to be the time",
         ],
     ),

@@ -92,11 +92,7 @@ fn units() {
         unknown.as_bytes(),
         &[],
         1,
-        &[
-            "\"bridge\" does not say its unit",
-            "--unit V",
-            "--unit \"N m\"",
-        ],
+        &["\"bridge\" has no unit", "--unit V", "--unit \"N m\""],
     );
     refused(
         good().as_bytes(),
@@ -108,7 +104,7 @@ fn units() {
         good().as_bytes(),
         &["--unit", "kg"],
         1,
-        &["\"kg\"", "does not become torque"],
+        &["\"kg\"", "cannot be converted to torque"],
     );
     let no_time_unit = good().replace("time_s", "time");
     refused(
@@ -440,7 +436,7 @@ fn a_record_cut_in_its_last_line_is_used_up_to_there() {
         let end = whole.rfind("0.14995,").unwrap();
         folder.write("in.csv", format!("{}{keep}", &whole[..end]));
         let ran = folder.run(&[&COMPENSATE[..], &["--force"]].concat());
-        ran.says(3, &["truncated-last-line", "line 3001", "left out"]);
+        ran.says(3, &["truncated-last-line", "line 3001", "skipped"]);
         assert_eq!(folder.read("out.csv").lines().count(), 3000);
     }
     // The same with the time as the last column and the cut within it.

@@ -243,9 +243,9 @@ fn failures_end_the_run_where_asked() {
         );
     }
     let fast = folder.run(&with(&MANY, &["--jobs", "1", "--fail-fast"]));
-    fast.says(1, &["1 of 6 recordings failed, 5 were not begun"]);
+    fast.says(1, &["1 of 6 recordings failed, 5 were not started"]);
     let two = folder.run(&with(&MANY, &["--jobs", "1", "--max-failures", "2"]));
-    two.says(1, &["2 of 6 recordings failed, 4 were not begun"]);
+    two.says(1, &["2 of 6 recordings failed, 4 were not started"]);
     // The report says which failed: an additional JSON failure would make the output unparsable.
     let report = folder.run(&with(&MANY, &["--jobs", "1", "--fail-fast", "--json"]));
     let report: Value = serde_json::from_str(&report.stdout).expect("one JSON document");
@@ -527,7 +527,7 @@ fn results_never_take_the_place_of_each_other_or_of_a_recording() {
     ];
     folder
         .run(&over)
-        .says(2, &["would take the place of the recording"]);
+        .says(2, &["would overwrite the recording"]);
     assert_eq!(folder.read("logs/a.csv"), log(0));
     // Results next to the recordings are not recordings for the next run, nor are stand file and
     // summary.

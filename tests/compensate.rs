@@ -307,7 +307,7 @@ fn what_the_command_line_overrides_is_said() {
     };
     run(&["--unit", "mV"]).says(0, &["unit-overrides-heading", "says V"]);
     run(&["--rate", "10000"]).says(0, &["rate-overrides-stamps", "20000 Hz"]);
-    run(&["--resample", "--rate", "1000"]).says(1, &["20000 Hz", "fold"]);
+    run(&["--resample", "--rate", "1000"]).says(1, &["20000 Hz", "alias"]);
     assert!(
         !run(&["--unit", "V", "--rate", "20000"])
             .stderr

@@ -267,7 +267,10 @@ fn what_is_missing_is_said() {
     let diagnose = ["diagnose", "--measured", "gage_V"];
     folder
         .run(&[&diagnose[..], &["--decay", "hit.csv"]].concat())
-        .says(1, &["hit.csv", "one decay is fitted", "--holdout-decay"]);
+        .says(
+            1,
+            &["hit.csv", "the only decay is fitted", "--holdout-decay"],
+        );
     folder
         .run(&[&diagnose[..], &["--train", "hit.csv", "--decay", "hit.csv"]].concat())
         .says(2, &["--applied"]);

@@ -182,7 +182,7 @@ fn a_fundamental_beside_the_line_is_said() {
         let all = orders.chain(more.split(' ')).collect::<Vec<_>>();
         folder.run(&[&HARMONICS[..], &all].concat())
     };
-    refine("--refine").says(1, &["--refine-span searches further than 2 %"]);
+    refine("--refine").says(1, &["--refine-span searches beyond 2 %"]);
     let refined = refine(advice);
     assert!(refined.stdout.contains("29.1"), "{}", refined.stdout);
     for seconds in [2.0, 10.0] {
@@ -491,10 +491,7 @@ fn an_applied_channel_of_another_time_is_no_effect() {
         assert!(!ran.stdout.contains("verdict: explained"), "{ran:?}");
     };
     for late in [0.5e-4, 3e-4, 1e-3] {
-        says(
-            diagnose(late, 1.0),
-            &["the applied channel comes late", "ms"],
-        );
+        says(diagnose(late, 1.0), &["the applied channel lags by", "ms"]);
     }
     says(diagnose(0.0, 1.0005), &["different clocks", "ppm"]);
     let early = diagnose(-3e-4, 1.0);
@@ -629,7 +626,7 @@ fn a_mark_for_no_value_is_said_wherever_it_is() {
     for more in [&[][..], &["--whole-record"]] {
         let report = folder.json(&[&COMPENSATE[..], more, &["--force", "--json"]].concat());
         let warnings = report["warnings"].to_string();
-        assert!(warnings.contains("a sample stands alone"), "{warnings}");
+        assert!(warnings.contains("one isolated sample"), "{warnings}");
         assert!(warnings.contains("196.607 s"), "{warnings}");
     }
 }

@@ -100,7 +100,7 @@ fn orders_that_cannot_be_seen_are_said() {
         .says(1, &["half the sampling rate"]);
     folder
         .run(&[&HARMONICS[..], &["0.05"]].concat())
-        .says(1, &["in.csv", "cannot be told apart", "record at least"]);
+        .says(1, &["in.csv", "cannot be resolved", "record at least"]);
     folder
         .run(&[&HARMONICS[..], &["55", "--refine", "--orders", "1"]].concat())
         .says(1, &["could not be refined"]);

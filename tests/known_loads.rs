@@ -166,7 +166,7 @@ fn loads_that_say_nothing_are_refused() {
     folder.write("loads.csv", "load_Nm,gage_mV\n0,1\n5,3\n0,1\n");
     run(&APPLIED).says(1, &["loads.csv", "2 different loads"]);
     folder.write("loads.csv", "load_Nm,gage_mV\n0,1\n5,1\n10,1\n");
-    run(&APPLIED).says(1, &["loads.csv", "do not give a gain"]);
+    run(&APPLIED).says(1, &["loads.csv", "do not determine a gain"]);
     folder.write("loads.csv", "load_Nm,gage_um\n0,1\n5,3\n10,5\n");
     run(&APPLIED).says(1, &["loads.csv", "different kinds"]);
 }

@@ -242,7 +242,7 @@ fn recordings_that_were_not_begun_are_named() {
     assert_eq!(folder.run(&fast).code, 1);
     refused(
         &folder,
-        &["[not-begun]", "not begun after failures", "--fail-fast"],
+        &["[not-begun]", "not started after failures", "--fail-fast"],
     );
 }
 

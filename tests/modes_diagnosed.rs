@@ -295,7 +295,7 @@ fn an_acceleration_is_diagnosed_as_one() {
     assert!(refined.contains("measures = \"acceleration\""), "{refined}");
     let warnings = report["warnings"].to_string();
     assert!(
-        warnings.contains("they go with the displacement"),
+        warnings.contains("they depend on the displacement"),
         "{warnings}"
     );
 }

@@ -286,7 +286,7 @@ fn many_recordings_may_have_names_that_are_no_utf8() {
             "extract", "logs", "-o", "logs", "--name", "{name}", "--force",
         ],
     );
-    ran.says(2, &["would take the place of the recording"]);
+    ran.says(2, &["would overwrite the recording"]);
 }
 
 #[test]

@@ -67,7 +67,12 @@ fn what_the_model_does_not_cover_is_left_unexplained() {
     close(&constant["predicted"], 165.1, 1.0);
     close(&constant["measured"], 1230.0, 1e-9);
     assert!(constant["explained_by"].is_null());
-    assert!(constant["note"].as_str().unwrap().contains("cannot tell"));
+    assert!(
+        constant["note"]
+            .as_str()
+            .unwrap()
+            .contains("do not show which")
+    );
 }
 
 #[test]

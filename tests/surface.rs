@@ -95,7 +95,7 @@ fn a_wavy_spring_is_drawn_and_gets_no_name() {
     let apart = apart(&points, 0.6, 0.002, |x| wavy(x, 0.0));
     assert!(apart < 4.0, "{apart} {points:?}");
     let page = folder.read("page.html");
-    assert!(page.contains("The torque that is missing, of no given law"));
+    assert!(page.contains("The missing torque, without an assumed law"));
 }
 
 fn one_way(_: f64, v: f64) -> f64 {

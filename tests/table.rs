@@ -91,7 +91,7 @@ fn linear_effects_are_in_it_and_others_are_refused() {
     let at_rest = folder.run(&AT_REST);
     assert_eq!(at_rest.stdout.lines().nth(1), Some("0,,,,"));
     let cubic = "kind = \"cubic-stiffness\"\nform = \"beside\"\ncoefficient = \"1 N m/(N m)^3\"";
-    stand(cubic).says(1, &["cubic-stiffness", "no response over frequency"]);
+    stand(cubic).says(1, &["cubic-stiffness", "no frequency response"]);
 }
 
 #[test]

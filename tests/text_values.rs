@@ -124,7 +124,7 @@ fn numbers_that_mark_missing_values_are_none() {
             report
                 .stdout
                 .replace("\n      ", " ")
-                .contains("instruments for no value or over range"),
+                .contains("instruments write for no value or over range"),
             "{}",
             report.stdout
         );

@@ -171,9 +171,9 @@ impl Listing {
 
     fn nothing_in(&self, folder: &Path) -> Failure {
         let rest = match self.left_out.len() {
-            0 => "it has no files except hidden ones and results".to_owned(),
+            0 => "it contains only hidden files and results".to_owned(),
             count => format!(
-                "none of its files ({count}) begins as a table of numbers or an MCAP file does"
+                "none of its files ({count}) starts like a table of numbers or an MCAP file"
             ),
         };
         Failure::failed(

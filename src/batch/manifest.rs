@@ -73,7 +73,7 @@ pub(crate) struct RunBegin {
 pub(crate) struct WholeList {
     /// Number of recordings.
     pub(super) recordings: usize,
-    /// SHA-256 of the paths of the recordings below their roots, sorted, a zero byte behind each.
+    /// SHA-256 of the paths of the recordings below their roots, sorted, a zero byte after each.
     pub(super) sha256: String,
 }
 
@@ -96,7 +96,7 @@ pub(crate) struct RunEnd {
     pub(super) schema: String,
     /// Version of torqcomp.
     pub(super) version: String,
-    /// Recordings whose results were there, by their paths; their lines are those of an earlier run.
+    /// Paths of the recordings whose results existed; their lines are from an earlier run.
     pub(super) skipped: Vec<String>,
 }
 
@@ -127,7 +127,7 @@ impl ManifestLine {
 pub(crate) struct MadeBy {
     /// The verb.
     pub(super) verb: String,
-    /// The options given that a result may depend on.
+    /// Given options that may affect the result.
     pub(super) options: Vec<String>,
 }
 
@@ -156,7 +156,7 @@ pub(crate) struct OutputSum {
 pub(crate) struct NotedWarning {
     /// Stable code of the warning.
     pub(super) code: String,
-    /// The warning for people.
+    /// Human-readable message.
     pub(super) message: String,
 }
 

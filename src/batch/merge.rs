@@ -32,7 +32,7 @@ pub(crate) struct Merged {
     failed: usize,
     /// Recordings that are in several manifests with the same result, counted once.
     repeated: usize,
-    /// What keeps the runs from being one finished job.
+    /// Why the runs are not one finished job.
     problems: Vec<MergeProblem>,
     /// Lines of the recordings, in the order of folders and names.
     files: Vec<ManifestEntry>,
@@ -45,7 +45,7 @@ struct MergeProblem {
     code: &'static str,
     /// Path of the manifest that the problem is about; `null` if it is about all.
     manifest: Option<String>,
-    /// The problem for people.
+    /// Human-readable message.
     message: String,
 }
 
@@ -156,8 +156,8 @@ impl Report for Merged {
 
 fn no_run(manifest: String) -> MergeProblem {
     let message = format!(
-        "{manifest}: no run of this version's manifests in it: another file, or cut in its first line; run that part \
-         again, and give the manifest that it writes"
+        "{manifest}: no run of this version in it: another file, or truncated in its first line; run that part again, \
+         and give the manifest that it writes"
     );
     MergeProblem {
         code: "no-run",
@@ -176,14 +176,14 @@ fn unfinished(run: &LastRun) -> Option<MergeProblem> {
     let all = plural(run.begin.files.len() as u64, "recording");
     if !run.has_ended {
         let message = format!(
-            "its run was cut off, {missing} of {all} not done{which}; run it again with --skip-existing, which goes on \
-             where it was, or leave this manifest out if another has its recordings"
+            "its run was cut off, {missing} of {all} not done{which}; run it again with --skip-existing, which \
+             continues it, or omit this manifest if another has its recordings"
         );
         return Some(MergeProblem::of(run, "cut-off", message));
     }
     (missing > 0).then(|| {
         let message = format!(
-            "{missing} of {all} not begun after failures{which}; run it again with --skip-existing and without \
+            "{missing} of {all} not started after failures{which}; run it again with --skip-existing and without \
              --fail-fast or --max-failures"
         );
         MergeProblem::of(run, "not-begun", message)
@@ -223,8 +223,8 @@ fn other_job(first: &LastRun, run: &LastRun) -> Option<MergeProblem> {
     }
     (run.shard.is_some() && begin.all != other.all).then(|| {
         let message = format!(
-            "other recordings were there than for {} ({} instead of {}): some were added, removed or renamed between the \
-             runs; run all parts again with --skip-existing",
+            "its recordings differ from those of {} ({} instead of {}): some were added, removed or renamed between \
+             the runs; run all parts again with --skip-existing",
             first.manifest, begin.all.recordings, other.all.recordings
         );
         MergeProblem::of(run, "other-recordings", message)
@@ -351,8 +351,8 @@ fn differing_results([first, other]: [&String; 2], files: &[String]) -> MergePro
         code: "differing-results",
         manifest: Some(other.clone()),
         message: format!(
-            "{other}: other results than in {first} of {}: {}; leave out the manifest that is out of date, or run these \
-             recordings again",
+            "{other}: other results than in {first} of {}: {}; omit the outdated manifest, or run these recordings \
+             again",
             plural(files.len() as u64, "recording"),
             summary::some_of(files, files.len())
         ),

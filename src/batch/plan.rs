@@ -118,7 +118,7 @@ impl<'a> BatchPlan<'a> {
                 Failure::usage(
                     ErrorCode::ConflictingArguments,
                     format_args!(
-                        "{option} {}: of many recordings each has its own, in the folder of -o: {expected}",
+                        "{option} {}: with several recordings each has its own, in the folder of -o: {expected}",
                         path.shown()
                     ),
                 )
@@ -146,8 +146,8 @@ impl<'a> BatchPlan<'a> {
                     return Err(Failure::usage(
                         ErrorCode::ConflictingArguments,
                         format_args!(
-                            "{} and {} would both become {output}; give --name '{{name}}…' if they differ \
-                             in their endings, or one folder that holds both, so that its tree is kept",
+                            "{} and {} would both become {output}; give --name '{{name}}…' if their extensions differ, \
+                             or a folder that contains both, so that its tree is kept",
                             other.shown(),
                             path.shown()
                         ),
@@ -157,8 +157,8 @@ impl<'a> BatchPlan<'a> {
                     return Err(Failure::usage(
                         ErrorCode::ConflictingArguments,
                         format_args!(
-                            "the result of {} would take the place of the recording {}; give another \
-                             --name, or another folder with -o",
+                            "the result of {} would overwrite the recording {}; give another --name, or another folder \
+                             with -o",
                             path.shown(),
                             input.shown()
                         ),

@@ -54,7 +54,7 @@ pub(super) enum Treated {
 /// A recording in the document of a run.
 #[derive(Serialize, JsonSchema)]
 struct TreatedEntry {
-    /// `made` (worked on, well or not), or `skipped`: the results were there.
+    /// `made` (processed, successfully or not), or `skipped`: the results existed.
     status: &'static str,
     #[serde(flatten)]
     entry: ManifestEntry,
@@ -111,19 +111,19 @@ pub(crate) struct BatchReport<'a> {
     manifest: String,
     /// Number of recordings.
     recordings: usize,
-    /// Recordings that were worked on with success.
+    /// Recordings processed successfully.
     made: usize,
-    /// Recordings whose results were there.
+    /// Recordings whose results existed.
     skipped: usize,
     /// Recordings that failed.
     failed: usize,
-    /// Recordings that were not begun, after failures.
+    /// Recordings not started, after failures.
     not_begun: usize,
     /// Time that the run took, in s.
     seconds: f64,
-    /// Files of folders that are no recordings by their content.
+    /// Files in folders whose content is not a recording.
     left_out: &'a [String],
-    /// Lines of the recordings that were begun, with what became of each.
+    /// Lines of the recordings that were started, with the result of each.
     files: Vec<&'a Treated>,
 }
 
@@ -195,12 +195,12 @@ impl BatchResult<'_> {
         let left_out = &self.plan.left_out;
         if !left_out.is_empty() {
             let names = some_of(left_out, left_out.len());
-            text += &format!("no recordings by their content, left out: {names}\n");
+            text += &format!("no recordings by their content, skipped: {names}\n");
         }
         if self.plan.history.unread > 0 {
             let lines = plural(self.plan.history.unread as u64, "line");
             text += &format!(
-                "{lines} of the manifest cannot be read and say nothing: cut, or of another version\n"
+                "{lines} of the manifest cannot be read and are ignored: truncated, or of another version\n"
             );
         }
         text
@@ -256,7 +256,7 @@ pub(super) fn ended<'a>(
         let others = match not_begun {
             _ if failed == count => String::new(),
             0 => "; the others are done".to_owned(),
-            count => format!(", {count} were not begun"),
+            count => format!(", {count} were not started"),
         };
         return Err(Failure::failed(
             ErrorCode::RecordingsFailed,
@@ -291,7 +291,7 @@ pub(super) fn warnings<'a>(
         .map(|(code, count)| format!("{code} in {count}"));
     let each: Vec<String> = each.collect();
     format!(
-        "warnings: {} (their words are in {place})\n",
+        "warnings: {} (their messages are in {place})\n",
         each.join(", ")
     )
 }
@@ -301,7 +301,7 @@ fn failures<'a>(entries: impl Iterator<Item = &'a ManifestEntry>) -> String {
     let line = |entry: &ManifestEntry| {
         let (word, input) = (word(entry.exit), &entry.input);
         let why = entry.error.as_deref();
-        let why = why.unwrap_or("data were lost, or --strict made a warning count");
+        let why = why.unwrap_or("data were lost, or --strict turned a warning into a failure");
         match why.starts_with(input) {
             true => format!("torqcomp: {word}: {why}\n"),
             false => format!("torqcomp: {word}: {input}: {why}\n"),

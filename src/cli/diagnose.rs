@@ -20,28 +20,28 @@ pub struct Diagnose {
     /// Hold-out record; may be given several times [default: the last 30 % of each training record]
     #[arg(long, value_name = "FILE", requires = "train")]
     pub holdout: Vec<PathBuf>,
-    /// Record of free ringing to fit, of the measured quantity alone: after hits or a load that was let go; may be given
-    /// several times
+    /// Record of a free decay to fit, with the measured quantity alone: after hits or the release of a load; may be
+    /// given several times
     #[arg(long, value_name = "FILE")]
     pub decay: Vec<PathBuf>,
-    /// Hold-out record of free ringing; may be given several times [default: without --train, the last decay]
+    /// Hold-out record of a free decay; may be given several times [default: without --train, the last decay]
     #[arg(long, value_name = "FILE")]
     pub holdout_decay: Vec<PathBuf>,
-    /// Known loads that were put on slowly, a table or a record with the applied and the measured quantity: they give the gain
-    /// that free ringing does not show, and check the effects; may be given several times
+    /// Known loads applied slowly, a table or a record with the applied and the measured quantity: they determine the
+    /// gain, which a free decay does not, and check the effects; may be given several times
     #[arg(long = "static", value_name = "FILE")]
     pub static_loads: Vec<PathBuf>,
-    /// Channel with the applied quantity: its number as inspect gives it, heading or name; of an MCAP file topic and
-    /// field, as '/joint_states.effort[name=motor]', or the field of --topic
+    /// Channel with the applied quantity: its number in inspect, heading or name; for an MCAP file topic and field, as
+    /// in '/joint_states.effort[name=motor]', or the field of --topic
     #[arg(long, value_name = "COL", required_unless_present_any = ["decay", "holdout_decay"])]
     pub applied: Option<String>,
     /// Channel with the measured quantity
     #[arg(long, value_name = "COL")]
     pub measured: String,
-    /// Unit of the applied quantity, if its heading does not say
+    /// Unit of the applied quantity, if its heading does not give it
     #[arg(long, value_name = "UNIT")]
     pub applied_unit: Option<String>,
-    /// Unit of the measured quantity, if its heading does not say
+    /// Unit of the measured quantity, if its heading does not give it
     #[arg(long, value_name = "UNIT")]
     pub measured_unit: Option<String>,
     /// How the records are read.
@@ -50,7 +50,7 @@ pub struct Diagnose {
     /// Write an HTML report with charts of records, models and residuals
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
-    /// List all candidates in the text, not the best five
+    /// List all candidates in the text, not only the best five
     #[arg(long)]
     pub all: bool,
     /// The refined stand file.

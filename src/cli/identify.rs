@@ -119,11 +119,11 @@ pub struct Response {
     /// Recordings of one stand
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
-    /// Channel of the excitation (hammer force, exciter force, known torque): its number as inspect gives it, heading or
-    /// name; of an MCAP file topic and field, as '/joint_states.effort[name=motor]', or the field of --topic
+    /// Channel of the excitation (hammer force, exciter force, known torque): its number in inspect, heading or name;
+    /// for an MCAP file topic and field, as in '/joint_states.effort[name=motor]', or the field of --topic
     #[arg(long, value_name = "NAME")]
     pub applied: String,
-    /// Unit of the excitation, if its heading does not say
+    /// Unit of the excitation, if its heading does not give it
     #[arg(long, value_name = "UNIT")]
     pub applied_unit: Option<String>,
     /// Radius at which a force acts: torque = force x radius
@@ -132,7 +132,7 @@ pub struct Response {
     /// Channel of the response
     #[arg(long, value_name = "NAME")]
     pub measured: String,
-    /// Unit of the response, if its heading does not say
+    /// Unit of the response, if its heading does not give it
     #[arg(long, value_name = "UNIT")]
     pub measured_unit: Option<String>,
     /// Quantity of the measured channel [default: from its unit]
@@ -194,7 +194,7 @@ pub struct Runup {
     /// Let viscous friction differ by direction
     #[arg(long)]
     pub by_direction: bool,
-    /// Half of the averaging window, in seconds [default: chosen from the data]
+    /// Half-width of the averaging window, in seconds [default: chosen from the data]
     #[arg(long, value_name = "S")]
     pub window: Option<f64>,
     /// How the file is read.

@@ -12,39 +12,40 @@ use crate::io::sum;
 /// Many recordings, each read by itself.
 #[derive(Debug, Clone, Default, Args)]
 pub struct BatchOptions {
-    /// Also take the recordings that a file lists, one path a line (- for standard input)
+    /// Also process the recordings listed in a file, one path per line (- for standard input)
     #[arg(long, value_name = "FILE")]
     pub files_from: Option<PathBuf>,
-    /// Paths of --files-from end with a zero byte instead of a line end
+    /// Paths of --files-from end with a zero byte instead of a newline
     #[arg(short = '0', long, requires = "files_from")]
     pub null: bool,
-    /// Names of the results in the folder of -o: {stem} and {ext} are the recording's name before and behind its last point,
-    /// {name} is all of it
+    /// Names of the results in the folder of -o: {stem} and {ext} are the recording's name before and after its last
+    /// dot, {name} is all of it
     #[arg(long, value_name = "TEMPLATE", value_parser = template, help_heading = "Many recordings")]
     pub name: Option<String>,
-    /// Skip recordings whose results are there and, by the manifest, made from the same recording, stand, options and
-    /// version; results of before are replaced
+    /// Skip recordings whose results exist and, by the manifest, were made from the same recording, stand, options and
+    /// version; outdated results are replaced
     #[arg(long)]
     pub skip_existing: bool,
-    /// What was made from what, a JSON line for each recording [default: torqcomp-manifest.jsonl in the folder of -o]
+    /// List of inputs and results, a JSON line for each recording [default: torqcomp-manifest.jsonl in the folder of
+    /// -o]
     #[arg(long, value_name = "FILE")]
     pub manifest: Option<PathBuf>,
     /// Write a CSV table with a row for each recording
     #[arg(long, value_name = "FILE")]
     pub summary: Option<PathBuf>,
-    /// Recordings worked on at a time [default: SLURM_CPUS_PER_TASK, else the cores that this process may use]
+    /// Recordings processed in parallel [default: SLURM_CPUS_PER_TASK, else the cores that this process may use]
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
-    /// Begin no other recording after the first failure
+    /// Start no further recording after the first failure
     #[arg(long, conflicts_with = "max_failures")]
     pub fail_fast: bool,
-    /// Begin no other recording after N failures
+    /// Start no further recording after N failures
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub max_failures: Option<u32>,
-    /// Take the I-th of N parts of the recordings only, I from 1; each stays in its part when others are added
+    /// Process only the I-th of N parts of the recordings, I from 1; each stays in its part when others are added
     #[arg(long, value_name = "I/N", value_parser = shard)]
     pub shard: Option<Shard>,
-    /// List what would be done and write nothing
+    /// List what would be done, but write nothing
     #[arg(long)]
     pub dry_run: bool,
 }
@@ -146,8 +147,7 @@ pub(crate) fn template(text: &str) -> Result<String, String> {
     match text.contains("{stem}") || text.contains("{name}") {
         true => Ok(text.to_owned()),
         false => Err(
-            "expected {stem} or {name} in it, so that each recording has a result of its own"
-                .to_owned(),
+            "expected {stem} or {name} in it, so that each recording has its own result".to_owned(),
         ),
     }
 }

@@ -10,7 +10,7 @@ pub struct Messages {
     /// Print only warnings and errors to standard error
     #[arg(short, long, global = true)]
     pub quiet: bool,
-    /// How far the work has got, on standard error [default: auto]
+    /// Show progress on standard error [default: auto]
     #[arg(long, value_enum, value_name = "WHEN", global = true)]
     pub progress: Option<ProgressMode>,
     /// Append a JSON line to a file for the start, each warning, each failure and the end of the run

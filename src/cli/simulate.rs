@@ -22,18 +22,18 @@ pub struct Simulate {
     /// Stand file
     #[arg(long, value_name = "FILE")]
     pub stand: PathBuf,
-    /// Channel with the applied quantity: its number as inspect gives it, heading or name; of an MCAP file topic and
-    /// field, as '/joint_states.effort[name=motor]', or the field of --topic
+    /// Channel with the applied quantity: its number in inspect, heading or name; for an MCAP file topic and field, as
+    /// in '/joint_states.effort[name=motor]', or the field of --topic
     #[arg(long, value_name = "COL")]
     pub applied: Option<String>,
-    /// Course of the applied quantity between its samples
+    /// Behaviour of the applied quantity between its samples
     #[arg(long, value_enum, default_value = "band-limited")]
     pub between: Between,
-    /// The recording is one period of the applied quantity, or a whole number of them: give the answer to it once it
-    /// has been repeated until the motion is steady
+    /// The recording is one period of the applied quantity, or a whole number of them: give the steady-state response
+    /// to its repetition
     #[arg(long)]
     pub periodic: bool,
-    /// Unit of the applied quantity, if its heading does not say
+    /// Unit of the applied quantity, if its heading does not give it
     #[arg(long, value_name = "UNIT")]
     pub unit: Option<String>,
     /// How the recording is read.
@@ -64,7 +64,7 @@ impl Simulate {
 /// Courses of a quantity between its samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Between {
-    /// Nothing above half the sampling rate: recorded behind an anti-alias filter
+    /// Nothing above half the sampling rate: recorded through an anti-aliasing filter
     BandLimited,
     /// Straight lines
     StraightLines,

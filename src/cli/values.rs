@@ -66,7 +66,7 @@ pub fn svg_file(path: PathBuf) -> Result<PathBuf, String> {
     }
     match path.extension() {
         Some(end) if !end.eq_ignore_ascii_case("svg") => Err(format!(
-            "charts are written as SVG only; name it {}, and convert that if need be",
+            "charts are written as SVG only; name it {}, and convert it if necessary",
             path.with_extension("svg").shown()
         )),
         _ => Ok(path),
@@ -89,7 +89,7 @@ pub fn result_file(path: PathBuf) -> Result<PathBuf, String> {
     let as_text = path.with_extension("csv");
     let advice = match COLUMNS.iter().find(is) {
         Some(_) => format!(
-            ": polars and DuckDB read it as it is, and convert it: duckdb -c \"COPY (FROM '{}') TO '{}.parquet'\"",
+            ": polars and DuckDB read it directly, and convert it: duckdb -c \"COPY (FROM '{}') TO '{}.parquet'\"",
             as_text.shown(),
             path.with_extension("").shown()
         ),

@@ -47,7 +47,7 @@ fn not_utf8() -> Failure {
     Failure::usage(
         ErrorCode::InvalidValue,
         format_args!(
-            "the argument {:?} is not UTF-8; only names of files may be something else",
+            "the argument {:?} is not UTF-8; only file names may be in another encoding",
             wrong.unwrap_or_default()
         ),
     )

@@ -120,8 +120,8 @@ fn refuse_derivative(stand: &Stand) -> Result<(), Failure> {
         other => Err(Failure::failed(
             ErrorCode::NotInvertible,
             format_args!(
-                "[mechanics] measures says {}, which holds no constant torque, so that no torque over time comes out \
-                 of it; use harmonics for the torques at single frequencies, or record displacement, strain or \
+                "[mechanics] measures is {}, which does not show a constant torque, so torque over time cannot be \
+                 recovered; use harmonics for the torques at single frequencies, or record displacement, strain or \
                  torque",
                 other.name()
             ),

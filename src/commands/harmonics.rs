@@ -46,7 +46,7 @@ pub(super) struct HarmonicsReport {
     taken_as: &'static str,
     /// Path of the stand file; `null` for a compensated record.
     stand: Option<String>,
-    /// How the record became torque at rest.
+    /// How the record was converted to static torque.
     calibration: String,
     /// Relative standard uncertainty of the constant of the calibration; `null` if unknown, or if there is none.
     calibration_relative_std: Option<f64>,
@@ -75,7 +75,7 @@ pub(super) struct HarmonicsReport {
     mean: f64,
     /// The component torques, by order.
     components: Vec<ComponentTorque>,
-    /// Rms of what the fit leaves of the record, in `unit`.
+    /// Rms of the residual, in `unit`.
     residual_rms: f64,
     /// Warnings, each with a stable code.
     warnings: Vec<Warning>,
@@ -94,11 +94,11 @@ struct ComponentTorque {
     recorded: f64,
     /// Phase of the recorded component, in degrees.
     recorded_phase_deg: f64,
-    /// Amplitude that acted over the recorded amplitude.
+    /// Applied over recorded amplitude.
     factor: f64,
-    /// Amplitude of the torque that acted, in `unit`.
+    /// Amplitude of the applied torque, in `unit`.
     torque: f64,
-    /// Phase of the torque that acted, in degrees.
+    /// Phase of the applied torque, in degrees.
     phase_deg: f64,
     /// Standard uncertainty of `torque` from the noise of the record, in `unit`.
     std: f64,
@@ -233,7 +233,7 @@ fn refined(
         Error::NotRefined { .. } => Failure::failed(
             ErrorCode::NotIdentifiable,
             format_args!(
-                "{error}; --refine-span searches further than {} % around it",
+                "{error}; --refine-span searches beyond {} % around it",
                 short(args.refine_span)
             ),
         ),
@@ -375,8 +375,8 @@ fn visible_orders(
         return Err(Failure::failed(
             ErrorCode::UnsuitableRecord,
             format_args!(
-                "no order of {} Hz lies below half the sampling rate of {} Hz; ask for lower orders or \
-             record faster",
+                "no order of {} Hz is below half the sampling rate of {} Hz; request lower orders or record at a \
+                 higher rate",
                 short(args.fundamental),
                 short(rate_hz)
             ),
@@ -386,7 +386,7 @@ fn visible_orders(
         warnings.push(Warning::new(
             "orders-above-nyquist",
             format!(
-                "above half the sampling rate of {} Hz, and omitted: {}",
+                "omitted, as above half the sampling rate of {} Hz: {}",
                 short(rate_hz),
                 match first == last {
                     true => format!("order {}", short(*first)),
@@ -442,7 +442,7 @@ fn lost_warning(components: &[ComponentTorque]) -> Option<Warning> {
         Warning::new(
             "components-lost-in-noise",
             format!(
-                "below twice their own uncertainty, so that they may be zero: {}",
+                "below twice their own uncertainty, so they may be zero: {}",
                 named(&lost)
             ),
         )

@@ -103,7 +103,7 @@ fn compose<R: BufRead, W: Write>(
         (None, None) => {
             return Err(Failure::usage(
                 ErrorCode::MissingArgument,
-                "give --from transducer, bridge, drawing or unknown; without a terminal nothing is asked",
+                "give --from transducer, bridge, drawing or unknown; without a terminal no questions are asked",
             ));
         }
     };

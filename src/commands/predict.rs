@@ -292,14 +292,13 @@ impl<'a> Drawing<'a> {
             causes.push("a recorder whose input resistance loads the bridge".to_owned());
         } else {
             causes.push(format!(
-                "more load on the bridge than the {} times counted",
+                "more load on the bridge than the {} times accounted for",
                 rounded(1.0 / loading, 4)
             ));
         }
-        causes.push("an end of the beam that is held against turning".to_owned());
+        causes.push("an end of the beam that is restrained against rotation".to_owned());
         Some(format!(
-            "measured is {} times predicted; {} can each contribute, and the constants alone cannot \
-             tell which",
+            "measured is {} times predicted; {} can each contribute, and the constants alone do not show which",
             rounded(factor, 3),
             causes.join(", ")
         ))
@@ -318,7 +317,7 @@ impl Stiffness {
                 "the smaller section of its thread",
                 parts.reduced_sections_m_per_n,
             ),
-            ("turning of its clamp", parts.clamp_m_per_n),
+            ("rotation of its clamp", parts.clamp_m_per_n),
         ] {
             if more > 0.0 {
                 total += more;
@@ -404,8 +403,8 @@ fn damping_note(damping: &PredictedConstant) -> Option<String> {
     let ratio = damping.predicted? / damping.measured?;
     (ratio < FAR_TOO_SMALL).then(|| {
         format!(
-            "friction over speed gives {} of the measured damping; the rest is not in the drawing, most \
-             likely it is lost in the beam and its joints",
+            "friction over speed gives {} of the measured damping; the rest is not in the drawing and is most likely \
+             dissipated in the beam and its joints",
             rounded(ratio, 2)
         )
     })

@@ -32,9 +32,9 @@ pub(super) struct SimulateReport {
     applied_unit: String,
     /// Unit of the simulated record.
     measured_unit: String,
-    /// Course that the input takes between samples.
+    /// Behaviour of the input between samples.
     input_between_samples: &'static str,
-    /// Whether the record is the steady answer to an input that repeats.
+    /// Whether the record is the steady-state response to a periodic input.
     is_steady: bool,
     /// Number of samples.
     samples: usize,
@@ -292,7 +292,7 @@ impl Report for SimulateReport {
             some => some.join(", "),
         };
         let answer = match self.is_steady {
-            true => ", the steady answer to them repeated",
+            true => ", the steady-state response to their repetition",
             false => "",
         };
         format!(
@@ -411,7 +411,8 @@ fn applied_unit(
             warnings.push(Warning::new(
                 "unit-assumed",
                 format!(
-                    "the channel \"{}\" gives no unit: {expected} was assumed, as the stand takes it; give another with --unit",
+                    "the channel \"{}\" has no unit: {expected}, which the stand expects, was assumed; give another \
+                     with --unit",
                     chosen.name
                 ),
             ));

@@ -36,7 +36,7 @@ struct TableRow {
     frequency_hz: f64,
     /// Applied over recorded torque.
     magnitude: f64,
-    /// Phase of the applied torque before the recorded one, in degrees.
+    /// Phase lead of the applied torque over the recorded one, in degrees.
     phase_deg: f64,
     /// Relative standard uncertainty of the magnitude; `null` if unknown.
     magnitude_relative_std: Option<f64>,

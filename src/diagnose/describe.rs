@@ -59,15 +59,14 @@ pub fn residual(
             100.0 * share.share.min(1.0),
             share.of,
             match is_hidden {
-                true => " (the noise floor, from differences between periods, contains that too)",
+                true => " (the noise floor, from differences between periods, includes that)",
                 false => "",
             }
         ));
     }
     if !found.settled && !found.after.effect_names().is_empty() {
         parts.push(
-            "the effect found switches so fast that the step size of the integration adds to the error; a second effect was not \
-             searched for"
+            "the effect found switches so fast that the integration step adds to the error; no second effect was tried"
                 .to_owned(),
         );
     }
@@ -109,8 +108,8 @@ fn level_dependence(levels: &ExcitationLevels) -> Option<String> {
     let differ = |ratio: f64, factor: f64| ratio.ln().abs() > factor.ln();
     (differ(level, LEVELS_DIFFER) && differ(error, ERRORS_DIFFER)).then(|| {
         format!(
-            "the plain stand has an error of {} on the training records and {} on the held-out ones, at {} times the \
-             excitation: what it lacks depends on amplitude",
+            "the plain stand has an error of {} on the training records and {} on the hold-out records, at {} times \
+             the excitation: the missing effect depends on amplitude",
             relative(levels.train_relative, 3),
             relative(levels.holdout_relative, 3),
             rounded(level, 3)
@@ -162,13 +161,14 @@ pub fn next_experiment(
 }
 
 /// The next record after the stand has changed.
-const AFTER_A_CHANGE: &str =
-    "look at clamps, bolts and what else may have moved at that moment, then record the same again";
+const AFTER_A_CHANGE: &str = "check clamps, bolts and anything else that may have moved at that moment, then repeat the record";
 
 /// Records that show a torque as a function of displacement, or of speed.
 pub fn shows_torque(over_displacement: bool) -> &'static str {
     match over_displacement {
-        true => "a slow load and unload over the whole range, and the response at two more levels",
+        true => {
+            "slow loading and unloading over the whole range, and the response at two more levels"
+        }
         false => "free decays from several amplitudes, and the response at two more levels",
     }
 }
@@ -189,9 +189,9 @@ fn records_apart(before: &ScoredModel) -> Option<Warning> {
     Some(Warning::new(
         "records-apart",
         format!(
-            "no single plain stand fits both training and held-out records: fitted separately, the training records give {:.5} Hz \
-             and damping ratio {:.4}, the held-out ones {:.5} Hz and {:.4}. They are of two stands or settings, or the stand \
-             changes with the level",
+            "no single plain stand fits both training and hold-out records: fitted separately, the training records \
+             give {:.5} Hz and damping ratio {:.4}, the hold-out records {:.5} Hz and {:.4}. They are of two stands or \
+             settings, or the stand changes with the level",
             train.natural_hz, train.damping_ratio, holdout.natural_hz, holdout.damping_ratio
         ),
     ))
@@ -214,8 +214,8 @@ fn uncertain_constants(before: &ScoredModel) -> Option<Warning> {
         Warning::new(
             "training-leaves-constants-open",
             format!(
-                "the training records determine {}: the hold-out error may come from that instead of a missing effect; train \
-                 on records that excite the resonance",
+                "the training records determine {}: that, and not a missing effect, may cause the hold-out error; \
+                 train on records that excite the resonance",
                 uncertain.join(" and ")
             ),
         )

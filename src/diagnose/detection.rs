@@ -21,13 +21,13 @@ pub struct DetectionLimit {
     pub effect: &'static str,
     /// The form of the effect for which this holds.
     pub form: &'static str,
-    /// The parameter that says how much of the effect there is.
+    /// Parameter that measures the size of the effect.
     pub parameter: &'static str,
-    /// Its magnitude from which on, or up to which, the effect shows; `null` if no physical amount does.
+    /// Magnitude above or below which the effect is detectable; `null` if no physically possible one is.
     pub value: Option<f64>,
     /// Unit of `value`; empty for a ratio.
     pub unit: String,
-    /// Whether larger or smaller values show: the lower a corner or a limit is, the more it changes.
+    /// Whether larger or smaller values are detectable: a corner or a limit changes more the lower it is.
     pub shows: ShownSide,
     /// Values of the effect's other parameters for which this holds.
     pub at: Vec<EffectParameter>,

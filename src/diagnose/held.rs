@@ -110,9 +110,9 @@ fn warning(context: &FitContext, stiffness: f64) -> Warning {
     Warning::new(
         "free-body",
         format!(
-            "the body moves freely: a spring of its own would take less than {} % of what is applied. So that the motion does not \
-             walk away from the model, both are held to the measured one by a spring of {} {} per {} ({} Hz): errors and \
-             noise are those of the applied quantity below that frequency",
+            "the body moves freely: a spring of its own would take less than {} % of what is applied. To keep model \
+             and motion together, a spring of {} {} per {} ({} Hz) ties both to the measured motion: errors and noise \
+             are those of the applied quantity below that frequency",
             rounded(100.0 * SMALL_SPRING, 2),
             rounded(stiffness * factors[1] / factors[0], 4),
             unit_or_as_recorded(acting),

@@ -28,7 +28,7 @@ impl SearchState {
         self.before = self.held_out(&self.before).ok_or_else(|| {
             Failure::failed(
                 ErrorCode::NotIdentifiable,
-                "the plain stand cannot be run on the held-out records",
+                "the plain stand cannot be simulated on the hold-out records",
             )
         })?;
         self.judge_surface();

@@ -74,7 +74,7 @@ impl KnownLoads {
             return Err(Failure::failed(
                 ErrorCode::TooFewSamples,
                 format_args!(
-                    "{} different loads are too few; put on at least {FEWEST}, the empty stand included",
+                    "{} different loads are too few; apply at least {FEWEST}, including no load",
                     different.len()
                 ),
             )
@@ -204,7 +204,7 @@ impl Diagnosis {
         if self.context().held.is_some() {
             return Err(Failure::failed(
                 ErrorCode::UnsuitableRecord,
-                "--static does not apply: the body moves freely, and under a load that stays it does not come to rest",
+                "--static does not apply: the body moves freely and does not come to rest under a constant load",
             ));
         }
         let follow = |fitted: &FittedModel| {
@@ -212,8 +212,8 @@ impl Diagnosis {
                 Failure::failed(
                     ErrorCode::NotIdentifiable,
                     format_args!(
-                        "the loads of --static do not give a gain ({error}): the reading does not follow them, or what is recorded \
-                         shows no load that stays"
+                        "the loads of --static do not determine a gain ({error}): the reading does not follow them, or \
+                         the recorded quantity does not show constant loads"
                     ),
                 )
                 .at(&loads[0].source)
@@ -271,8 +271,8 @@ fn gains_differ(
         Warning::new(
             "gain-differs",
             format!(
-                "the known loads give a static gain of {by_loads} {unit}, {} times the {} {unit} that stand file, units or other \
-                 records give: check the calibration and the lever arm of the loads",
+                "the known loads give a static gain of {by_loads} {unit}, {} times the {} {unit} from stand file, \
+                 units or other records: check the calibration and the lever arm of the loads",
                 rounded(gain / known, 4),
                 rounded(known, 6)
             ),
@@ -295,7 +295,7 @@ fn contradicted(
         Warning::new(
             "loads-contradict-effects",
             format!(
-                "the known loads do not bear out {}: the error under the loads is {} times that of a straight line",
+                "the known loads do not confirm {}: the error under the loads is {} times that of a straight line",
                 effects.join(" and "),
                 rounded(ratio.sqrt(), 3)
             ),

@@ -20,7 +20,7 @@ pub struct LadderStep {
     pub effects: Vec<&'static str>,
     #[serde(flatten)]
     pub errors: RmsErrors,
-    /// Probability of the gain over the step before by chance.
+    /// Probability of the gain over the previous step by chance.
     pub p_value: Option<f64>,
 }
 
@@ -29,8 +29,8 @@ pub struct LadderStep {
 pub struct EffectShare {
     /// Name of the effect.
     pub effect: &'static str,
-    /// Power of the hold-out records that is left without this effect and not with it, over the power that all effects
-    /// explain.
+    /// Increase of the residual power of the hold-out records without this effect, over the power explained by all
+    /// effects.
     pub share: f64,
 }
 
@@ -39,18 +39,18 @@ pub struct EffectShare {
 pub struct EffectCorrelation {
     /// Names of the two effects.
     pub effects: [&'static str; 2],
-    /// Correlation of what each of them alone explains.
+    /// Correlation of their separate contributions.
     pub correlation: f64,
 }
 
 /// What several effects explain, each and together.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 pub struct Ladder {
-    /// Hold-out errors with ever more effects.
+    /// Hold-out errors as effects are added.
     pub ladder: Vec<LadderStep>,
     /// What each of several effects explains.
     pub shares: Vec<EffectShare>,
-    /// How alike pairs of effects change the hold-out records.
+    /// Similarity of the changes that pairs of effects make in the hold-out records.
     pub correlations: Vec<EffectCorrelation>,
 }
 

@@ -256,7 +256,7 @@ impl SearchState {
         let before = ScoredModel::of(plain, &records).ok_or_else(|| {
             Failure::failed(
                 ErrorCode::NotIdentifiable,
-                "the plain stand cannot be run on the training records",
+                "the plain stand cannot be simulated on the training records",
             )
         })?;
         let tests = tests(&before);

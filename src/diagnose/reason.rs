@@ -170,9 +170,7 @@ impl Reason {
                 100.0 * explained.max(0.0)
             ),
             Self::NotConfirmed { change } => not_confirmed(&percent(*change)),
-            Self::Diverges => {
-                "the motion that it gives diverges on the held-out records".to_owned()
-            }
+            Self::Diverges => "its motion diverges on the hold-out records".to_owned(),
             Self::NoneAccepted => "no effect is accepted".to_owned(),
         }
     }
@@ -180,10 +178,10 @@ impl Reason {
 
 /// An effect that only removes the response to input noise.
 const TAKES_OUT_NOISE: &str =
-    "explains little but the noise of the applied quantity, of which it lets less through";
+    "explains little except the noise of the applied quantity, which it attenuates";
 
 /// Name of a surface over the motion.
-const OF_NO_LAW: &str = "a torque of no given law over displacement and speed";
+const OF_NO_LAW: &str = "a torque over displacement and speed without an assumed law";
 
 /// An effect that explains only a few percent of the residual power.
 fn small_share(percent: f64) -> String {
@@ -196,15 +194,15 @@ fn small_share(percent: f64) -> String {
 /// An effect not confirmed by the held-out records.
 fn not_confirmed(change: &str) -> String {
     format!(
-        "reduces the error of the training records, but that of the held-out ones changes by {change} only: not confirmed"
+        "reduces the training error, but the hold-out error changes by only {change}: not confirmed"
     )
 }
 
 /// A further effect that explains too little, with the minimum shares in percent.
 fn too_little([least, least_of_rest, rest]: [f64; 3]) -> String {
     format!(
-        "explains less than {least:.0} % of what the plain stand leaves above the noise (or less than {least_of_rest:.0} %, and \
-         {rest:.0} % of what is left now): too little for a further effect"
+        "explains less than {least:.0} % of the plain stand's residual above the noise (or less than \
+         {least_of_rest:.0} %, and {rest:.0} % of the present residual): too little for a further effect"
     )
 }
 
@@ -254,7 +252,7 @@ fn percent(change: f64) -> String {
 struct StatedReason {
     /// Whether the effect is added to the model.
     status: Status,
-    /// Why the effect is added, or is not.
+    /// Why the effect is or is not added.
     why: String,
 }
 

@@ -33,7 +33,7 @@ const NONSTATIONARY: f64 = 6.0;
 /// A share of the residual's power that follows from something.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct PowerShare {
-    /// What the share follows from.
+    /// Quantity that the share depends on.
     pub of: &'static str,
     /// Share of the residual's power.
     pub share: f64,
@@ -50,13 +50,13 @@ pub struct ResidualTests {
     pub whiteness_ratio: Option<f64>,
     /// Whether the cross-correlation with the input, at positive and negative lags, stays within 99 % bounds.
     pub independent_of_input: bool,
-    /// Lag of the largest cross-correlation in samples; negative: the residual comes before the input.
+    /// Lag of the largest cross-correlation in samples; negative: the residual leads the input.
     pub largest_lag: i64,
     /// Part of the power in the largest hundredth of the samples.
     pub in_largest_hundredth: f64,
     /// Shares of the power that follow from the input or the motion.
     pub shares: Vec<PowerShare>,
-    /// Share that other constants in each segment of the record remove.
+    /// Share removed by fitting constants to each segment of the record.
     pub changing_constants: PowerShare,
     /// Share proportional to the square of the signal, sample by sample.
     pub with_signal: PowerShare,

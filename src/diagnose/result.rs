@@ -45,7 +45,7 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// Names of the effects that were added.
     pub effects: Vec<&'static str>,
-    /// Names of those that the stand file declares; they are fitted anew in all models but the declared one.
+    /// Names of those that the stand file declares; they are refitted in all models except the declared one.
     pub declared_effects: Vec<&'static str>,
     /// `band-limited`, `straight-lines` or `held`.
     pub input_between_samples: &'static str,
@@ -56,24 +56,24 @@ pub struct Diagnosis {
     pub explained: Ladder,
     /// Constants of the plain stand.
     pub constants: Vec<StandConstant>,
-    /// Known loads that were put on slowly, and what the stand shows of them; `null` without any.
+    /// Known loads applied slowly, and the stand's response to them; `null` without any.
     pub known_loads: Option<LoadCheck>,
     /// The effects that were tried: accepted ones first, then by hold-out error.
     pub candidates: Vec<CandidateFit>,
-    /// For `nothing-missing`: of each effect the smallest amount that the training records would have shown.
+    /// For `nothing-missing`: the smallest amount of each effect detectable in the training records.
     pub detection_limits: Vec<DetectionLimit>,
-    /// A law that is not offered as an effect and leaves less than each of the effects; named, not added. `null` if there
-    /// is none.
+    /// A law outside the list of effects with a smaller residual than any of them; named, not added. `null` if there is
+    /// none.
     pub suspected: Option<GuardModel>,
-    /// For `partly-explained` and `unexplained`: the torque that follows from the motion, whatever its law, that of accepted laws
-    /// included. `null` where there is none, or it does not follow from the motion.
+    /// For `partly-explained` and `unexplained`: the torque as a function of the motion, without an assumed law,
+    /// including that of accepted laws. `null` where there is none, or it does not depend on the motion.
     pub force_surface: Option<ForceSurface>,
-    /// For `partly-explained` and `unexplained`: the moment at which constants of the stand changed within a record, if that
-    /// explains nearly all of what is left of it; `null` otherwise.
+    /// For `partly-explained` and `unexplained`: the moment at which constants of the stand changed within a record, if
+    /// that explains nearly all of its residual; `null` otherwise.
     pub changed_stand: Option<ChangedStand>,
-    /// What the last model leaves of the hold-out records.
+    /// Residual of the last model on the hold-out records.
     pub residual: ResidualReport,
-    /// What to record to tell the remaining candidates apart; `null` if nothing is needed.
+    /// What to record to distinguish the remaining candidates; `null` if nothing is needed.
     pub next_experiment: Option<String>,
     /// Warnings, each with a stable code.
     pub warnings: Vec<Warning>,
@@ -111,7 +111,8 @@ pub struct ErrorTable {
 pub struct ModelErrors {
     #[serde(flatten)]
     pub rms: RmsErrors,
-    /// Hold-out rms over the rms of the held-out records about their mean; of a free body over that of what acts.
+    /// Hold-out rms over the rms of the hold-out records about their mean; for a free body over that of the applied
+    /// quantity.
     pub holdout_relative: f64,
 }
 

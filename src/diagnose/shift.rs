@@ -89,8 +89,8 @@ pub fn weigh(
         return None;
     }
     let text = format!(
-        "an applied channel that is late by {} explains the training records about as well as {} ({} of error left, against \
-         {}): check that one recorder takes both channels, with the same filters",
+        "a lag of {} of the applied channel explains the training records about as well as {} (remaining error {}, \
+         against {}): check that one recorder takes both channels, with the same filters",
         stated(-shift.late_s, first.rate_hz()),
         effects.join(" and "),
         relative(shifted, 3),
@@ -157,9 +157,9 @@ fn stated(shift_s: f64, rate_hz: f64) -> String {
 
 fn too_early(record: &StandRecord, shift: Shift, as_given: f64, error: f64) -> String {
     format!(
-        "the applied channel comes late, by {}: a plain stand has an error of {}, and of {} with the applied channel \
-         shifted back by that; no stand answers before it is driven. Record both channels with one recorder and the same \
-         filters, or move the applied column up by that many rows",
+        "the applied channel lags by {}: a plain stand has an error of {}, and of {} with the lag removed; no stand \
+         responds before it is driven. Record both channels with one recorder and the same filters, or move the \
+         applied column up by that many rows",
         stated(-shift.late_s, record.rate_hz()),
         relative(as_given, 2),
         relative(error, 2),
@@ -168,8 +168,8 @@ fn too_early(record: &StandRecord, shift: Shift, as_given: f64, error: f64) -> S
 
 fn too_late(record: &StandRecord, shift: Shift, as_given: f64, error: f64) -> String {
     format!(
-        "the measured channel comes late, by {}: a plain stand has an error of {}, and of {} with that taken out, which no \
-         effect of the list reaches; declare the lag as [recorder] delay = \"{} ms\" in the stand file",
+        "the measured channel lags by {}: a plain stand has an error of {}, and of {} with the lag removed, less than \
+         with any effect of the list; declare it as [recorder] delay = \"{} ms\" in the stand file",
         stated(shift.late_s, record.rate_hz()),
         relative(as_given, 2),
         relative(error, 2),
@@ -188,9 +188,10 @@ fn two_clocks(train: &[StandRecord], alignment: &Alignment) -> String {
         format!("{} {side}", stated(shift_s.abs(), rate_hz))
     };
     format!(
-        "the two channels have different clocks: against what the applied channel causes, the measured one is {} at the start \
-         and {} at the end, a difference of {} ppm; a plain stand has an error of {as_given}, and of {error} with that \
-         taken out; record both channels with one clock, or resample one of them onto the other's",
+        "the two channels have different clocks: relative to the response to the applied channel, the measured one is \
+         {} at the start and {} at the end, a difference of {} ppm; a plain stand has an error of {as_given}, and of \
+         {error} with the drift removed; record both channels with one clock, or resample one of them onto the \
+         other's",
         late(shift.late_s),
         late(shift.late_s + shift.per_s * end_s),
         rounded(1e6 * shift.per_s, 3),

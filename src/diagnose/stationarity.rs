@@ -130,7 +130,7 @@ fn with_square(
 /// The power at the lowest frequencies above that of the neighbouring noise: a zero that drifts or jumps. The mean is
 /// excluded. The noise may rise towards them like first-order noise.
 pub fn wandering_zero(residuals: &[RecordResidual]) -> PowerShare {
-    const OF: &str = "a zero that drifts or jumps";
+    const OF: &str = "a drifting or jumping zero";
     let (mut excess, mut total, mut variance) = (0.0, 0.0, 0.0);
     for residual in residuals {
         let spectrum = spectra(&residual.samples, residual.samples.len()).power();

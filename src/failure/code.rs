@@ -15,23 +15,23 @@ pub enum ErrorCode {
     InvalidValue,
     /// Arguments exclude each other or do not apply here.
     ConflictingArguments,
-    /// There is no such file or folder, or nothing in it that is looked for.
+    /// There is no such file or folder, or it contains nothing suitable.
     NotFound,
     /// The system refuses to read a file.
     CannotRead,
-    /// The system refuses to write a file, or its format has no place for the result.
+    /// The system refuses to write a file, or its format cannot store the result.
     CannotWrite,
     /// The disk is full.
     DiskFull,
     /// The output exists and may not be replaced without --force.
     OutputExists,
-    /// The numbers need more memory or scratch space than there is.
+    /// The numbers need more memory or scratch space than available.
     NotEnoughRoom,
-    /// The file is no recording: no table of numbers in time, and no MCAP file with numbers.
+    /// The file is not a recording: neither a table of numbers over time nor an MCAP file with numbers.
     NotARecording,
-    /// The text can be read in two ways, and an option must say which is meant.
+    /// The text is ambiguous, and an option must resolve it.
     TextUnclear,
-    /// The file holds several tables and must be split.
+    /// The file contains several tables and must be split.
     SeveralTables,
     /// The file is damaged or ends too early.
     DamagedFile,
@@ -41,15 +41,15 @@ pub enum ErrorCode {
     ChannelUnclear,
     /// The unit is missing, unknown or has two meanings.
     UnitUnclear,
-    /// The unit is known, but not one that the work can use.
+    /// The unit is known, but unsuitable here.
     UnitUnsuitable,
     /// The sampling rate or the time axis is unknown.
     TimeUnknown,
     /// Time stamps are not uniform: gaps, jitter, backward steps, or a clock that jumped.
     IrregularTime,
-    /// No sample lies within the range asked for.
+    /// The requested range contains no samples.
     RangeEmpty,
-    /// A cell or sample holds no number, or none that can be a measurement.
+    /// A cell or sample is not a number, or cannot be a measurement.
     InvalidSample,
     /// The record is too short.
     TooFewSamples,
@@ -57,17 +57,17 @@ pub enum ErrorCode {
     TooManySamples,
     /// Records or channels that belong together differ in rate, unit, length or content.
     RecordsDiffer,
-    /// The channel is compensated already.
+    /// The channel is already compensated.
     AlreadyCompensated,
-    /// The record does not show what is looked for, or its channels are the wrong ones.
+    /// The record does not show the required behaviour, or its channels are wrong.
     UnsuitableRecord,
-    /// The data do not determine what is asked for.
+    /// The data do not determine the requested quantity.
     NotIdentifiable,
     /// The stand file cannot be read, or it contradicts itself or the record.
     InvalidStand,
-    /// The stand file lacks what this work needs.
+    /// The stand file lacks data needed here.
     IncompleteStand,
-    /// Effects of the stand cannot be taken back, or not together.
+    /// Effects of the stand cannot be inverted, or not together.
     NotInvertible,
     /// Some of many recordings failed.
     RecordingsFailed,

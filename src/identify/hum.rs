@@ -88,7 +88,7 @@ pub(super) fn taken_off(result: &mut Identification, lines: &[SteadyLine]) {
         ("mains-taken-off", "steady lines of the mains", of_mains),
         (
             "tone-taken-off",
-            "steady lines, as of a fan or a motor that runs,",
+            "steady lines, as from a running fan or motor,",
             others,
         ),
     ] {
@@ -96,8 +96,8 @@ pub(super) fn taken_off(result: &mut Identification, lines: &[SteadyLine]) {
             result.warn(
                 code,
                 format!(
-                    "{what} were fitted and taken off: {}; if one of them is the stand's own, record for longer, until it \
-                     has decayed",
+                    "{what} were fitted and removed: {}; if one of them is the stand's own, record for longer, until \
+                     it has decayed",
                     listed(&lines)
                 ),
             );

@@ -192,8 +192,8 @@ impl ChainInverse {
         }
         Err(Failure::failed(
             ErrorCode::NotInvertible,
-            "the capacitive coupling past the stand and the torques in it do not converge: one of them is too large to \
-             be taken back beside the other; leave one of the effects out of the stand file",
+            "the inversion of capacitive coupling and torques in the stand does not converge: one of them is too large \
+             to be inverted together with the other; remove one of the effects from the stand file",
         ))
     }
 
@@ -220,8 +220,8 @@ fn refuse_bent_coupling(stand: &Stand, chain: &Chain) -> Result<(), Failure> {
         (Some(coupled), Some(curve)) => Err(Failure::failed(
             ErrorCode::NotInvertible,
             format_args!(
-                "\"{}\" reaches the record past the stand, and \"{}\" bends what comes through it; the two cannot be \
-                 taken back together; leave the smaller one out",
+                "\"{}\" bypasses the stand, and \"{}\" distorts its response; the two cannot be inverted together; \
+                 remove the smaller one",
                 coupled.effect,
                 curve.effect
             ),
@@ -395,7 +395,7 @@ impl Pass<'_> {
         self.result.next = found.next;
         let hides = torques.iter().position(|torque| torque.hidden() > 0.0);
         let lost = Unrecovered {
-            why: "the gage shows nothing within the gap".to_owned(),
+            why: "the gage reads zero within the gap".to_owned(),
             samples: found.hidden,
         };
         self.lose(links[hides.unwrap_or(0)].effect, lost);

@@ -28,9 +28,10 @@ pub(crate) struct ResultStd {
     pub of_response_rms: Option<f64>,
     /// Samples from the start of the record over which the uncertainties were determined.
     pub samples: usize,
-    /// Constants over whose standard uncertainty the result is no straight line: their part is an estimate only.
+    /// Constants in which the result is nonlinear over their standard uncertainty: their contribution is only an
+    /// estimate.
     pub bent: Vec<String>,
-    /// Constants that cannot be moved by their standard uncertainty; they are left out.
+    /// Constants that cannot be varied by their standard uncertainty; they are excluded.
     pub left_out: Vec<String>,
 }
 

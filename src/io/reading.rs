@@ -27,7 +27,7 @@ pub struct Reading {
     /// Column with the time stamps
     #[arg(long, value_name = "NAME")]
     pub time_column: Option<String>,
-    /// Unit of the time stamps, if their heading does not say: s, ms, us, min
+    /// Unit of the time stamps, if their heading does not give it: s, ms, us, min
     #[arg(long, value_name = "UNIT")]
     pub time_unit: Option<String>,
     /// Sampling rate, where there are no time stamps or they are wrong; with --resample, the rate
@@ -37,25 +37,25 @@ pub struct Reading {
     /// Interpolate where the time stamps are not uniform, instead of refusing
     #[arg(long)]
     pub resample: bool,
-    /// What full scale of a WAV file stands for, with its unit, as "10 V"
+    /// Full scale of a WAV file, with its unit, as in "10 V"
     #[arg(long, value_name = "QUANTITY", value_parser = full_scale)]
     pub full_scale: Option<FullScale>,
     /// Part of the record to use: seconds on its time axis (0.5..2), times of day or dates; either end may be left out
     #[arg(long, value_name = "FROM..TO", value_parser = time_range, allow_hyphen_values = true)]
     pub range: Option<TimeRange>,
-    /// What stands in for missing samples: empty cells, and gaps of whole steps between the time stamps [default: refuse]
+    /// How to fill missing samples: empty cells, and gaps of whole steps between the time stamps [default: refuse]
     #[arg(long, value_name = "HOW", value_enum)]
     pub fill: Option<Fill>,
     /// Topic of an MCAP file (/joint_states); its fields are the channels
     #[arg(long, value_name = "TOPIC")]
     pub topic: Option<String>,
-    /// Time of messages that counts [default: their own stamp if they have one, else log]
+    /// Time of messages to use [default: their own stamp if they have one, else log]
     #[arg(long, value_name = "CLOCK", value_parser = clock)]
     pub time: Option<TimeChoice>,
-    /// Field with the spacing of the samples, for messages that hold many
+    /// Field with the sample spacing, for messages with many samples
     #[arg(long, value_name = "FIELD")]
     pub spacing: Option<String>,
-    /// Longest metadata, schema and channel records of an MCAP file that are read, in MiB [default: 64]
+    /// Largest metadata, schema and channel records read from an MCAP file, in MiB [default: 64]
     #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1024))]
     pub longest_metadata: Option<u64>,
     /// Whether stamps may be irregular, because they are only handed on.
@@ -86,16 +86,16 @@ pub struct FullScale {
 pub enum Fill {
     /// A straight line between the neighbours
     Linear,
-    /// The last value before
+    /// The last preceding value
     Hold,
-    /// Nothing: such records are refused
+    /// Do not fill: such records are refused
     Refuse,
 }
 
 /// Marks of a table, given by the user instead of found in the file.
 #[derive(Debug, Clone, Default, Args)]
 pub struct DialectOverride {
-    /// What separates the cells: , ; | tab space none
+    /// Cell separator: , ; | tab space none
     #[arg(long, value_name = "MARK", value_parser = delimiter)]
     pub delimiter: Option<Delimiter>,
     /// Decimal mark: . or ,
@@ -119,7 +119,7 @@ impl Reading {
 /// Which channel of a recording is read, and its unit if the file does not say or is wrong.
 #[derive(Debug, Clone, Args)]
 pub struct ChannelChoice {
-    /// Channel to read: its number as inspect gives it, its heading, its name, or a part of it that no other has
+    /// Channel to read: its number in inspect, its heading, its name, or a unique part of it
     #[arg(long, value_name = "NAME")]
     pub channel: Option<String>,
     /// Field of the messages of --topic.
@@ -127,7 +127,8 @@ pub struct ChannelChoice {
         long,
         value_name = "FIELD",
         requires = "topic",
-        help = "Field of the messages of --topic: effort[0], 'effort[name=motor]', 'data[:]'; none if it has one number"
+        help = "Field of the messages of --topic: effort[0], 'effort[name=motor]', 'data[:]'; not needed if it has a \
+            single number"
     )]
     pub field: Option<String>,
     /// Topic and field in one.
@@ -135,10 +136,10 @@ pub struct ChannelChoice {
         long,
         value_name = "PATH",
         conflicts_with = "topic",
-        help = "Topic and field of an MCAP file in one, as '/joint_states.effort[name=motor]'"
+        help = "Topic and field of an MCAP file in one, as in '/joint_states.effort[name=motor]'"
     )]
     pub signal: Option<String>,
-    /// Unit of the signal, if its heading does not say: V, mV, "N m", "ft lbf", ustrain
+    /// Unit of the signal, if its heading does not give it: V, mV, "N m", "ft lbf", ustrain
     #[arg(long, value_name = "UNIT")]
     pub unit: Option<String>,
     /// Flags of the verb that give channel and unit.

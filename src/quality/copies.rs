@@ -60,7 +60,7 @@ impl Family<'_> {
                 .collect();
             let hold = if same.len() == 1 { "holds" } else { "hold" };
             let message = format!(
-                "{} {hold} the same samples as \"{first}\": one signal stored several times",
+                "{} {hold} the same samples as \"{first}\": the same signal stored several times",
                 quoted.join(", ")
             );
             found.push((Warning::new("channel-copy", message), names(&same)));
@@ -71,7 +71,7 @@ impl Family<'_> {
                 format!("\"{}\" = {right}", seen.label)
             });
             let message = format!(
-                "{}, within its resolution: one signal in several scales",
+                "{}, within its resolution: the same signal in different scales",
                 equations.collect::<Vec<_>>().join("; ")
             );
             found.push((Warning::new("channel-multiple", message), names(&scaled)));

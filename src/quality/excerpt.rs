@@ -57,7 +57,7 @@ pub fn warnings(samples: &[f64], of: Of) -> Vec<Warning> {
     let mut found = super::of_findings(of.name, of.unit, findings, &axis);
     if samples.len() < of.samples {
         let rest = format!(
-            " (the first {} of {} samples were looked at)",
+            " (the first {} of {} samples were checked)",
             samples.len(),
             of.samples
         );

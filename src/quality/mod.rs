@@ -71,10 +71,7 @@ pub fn constant(channels: &[(&str, f64)]) -> Warning {
         .map(|(name, value)| format!("\"{name}\" is always {}", crate::print::short(*value)));
     Warning::new(
         "constant-channel",
-        format!(
-            "{}: not connected, not selected, or nothing happened",
-            join(named)
-        ),
+        format!("{}: not connected, not selected, or no signal", join(named)),
     )
 }
 
@@ -98,7 +95,7 @@ pub fn coarse(
     Warning::new(
         "coarse-quantisation",
         format!(
-            "{}: rounding alone adds noise of 0.29 steps rms; use a smaller range of the recorder",
+            "{}: rounding alone adds noise of 0.29 steps rms; use a smaller input range",
             join(named)
         ),
     )

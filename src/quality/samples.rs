@@ -160,7 +160,7 @@ fn non_finite_cells(name: &str, found: &NonFinite, axis: &TimeAxis, holes: &[Hol
         (HoleKind::NonFinite, "NaN or infinite"),
         (
             HoleKind::InstrumentsMark,
-            "with 9.91e37 or \u{b1}9.9e37, the mark of instruments for no value or over range",
+            "with 9.91e37 or \u{b1}9.9e37, which instruments write for no value or over range",
         ),
         (HoleKind::Text, "text"),
     ];
@@ -209,9 +209,9 @@ fn clipped(name: &str, unit: &str, end: &str, rail: &Rail, axis: &TimeAxis) -> W
     Warning::new(
         "clipped",
         format!(
-            "\"{name}\" is cut off at its {end} {level} of {}: {samples} are {there}, in {} of up to {} \
-             samples that the signal enters or leaves in full motion, the first at {}; use a larger range of the \
-             recorder, unless the signal itself is limited there",
+            "\"{name}\" is clipped at its {end} {level} of {}: {samples} are {there}, in {} of up to {} samples that \
+             the signal enters or leaves at full slope, the first at {}; use a larger input range, unless the signal \
+             itself is limited there",
             with_unit(rail.value, unit, 6),
             plural(rail.runs, "run"),
             rail.longest,
@@ -225,8 +225,8 @@ fn stuck(name: &str, unit: &str, found: &Standstills, axis: &TimeAxis) -> Warnin
     Warning::new(
         "stuck-channel",
         format!(
-            "\"{name}\" stands still in {}, {samples} samples in all; the longest is at {} from {} on, {} samples: \
-             at rest, or a cable, a transmitter or the recorder dropped out",
+            "\"{name}\" is constant in {}, {samples} samples in all; the longest is at {} from {} on, {} samples: at \
+             rest, or a drop-out of a cable, a transmitter or the recorder",
             plural(found.count, "stretch"),
             with_unit(longest.value, unit, 6),
             place(axis, longest.start),
@@ -238,17 +238,14 @@ fn stuck(name: &str, unit: &str, found: &Standstills, axis: &TimeAxis) -> Warnin
 fn spiked(name: &str, unit: &str, found: &Spikes, axis: &TimeAxis) -> Warning {
     let first = found.first;
     let (places, is_first) = match found.count {
-        1 => ("a sample stands alone".to_owned(), ""),
-        count => (
-            format!("samples stand alone in {count} places"),
-            ", the first",
-        ),
+        1 => ("one isolated sample".to_owned(), ""),
+        count => (format!("isolated samples in {count} places"), ", the first"),
     };
     Warning::new(
         "spikes",
         format!(
-            "\"{name}\": {places}, far from those on both sides{is_first} at {}: {} after {}; a mark for no value, a \
-             drop-out or a glitch, unless the signal has such pulses; repair them, or leave that part out",
+            "\"{name}\": {places}, far from the neighbours{is_first} at {}: {} after {}; a mark for a missing value, a \
+             drop-out or a glitch, unless the signal has such pulses; repair them, or exclude that part",
             place(axis, first.index),
             with_unit(first.value, unit, 6),
             with_unit(first.before, unit, 6)
@@ -271,7 +268,7 @@ fn repeated(name: &str, found: &Repeats, axis: &TimeAxis) -> Warning {
     };
     Warning::new(
         "repeated-samples",
-        format!("\"{name}\": {percent} % of the samples repeat the one before, {how}{rate}"),
+        format!("\"{name}\": {percent} % of the samples repeat the previous one, {how}{rate}"),
     )
 }
 
@@ -290,9 +287,8 @@ fn hum(name: &str, unit: &str, found: &Mains) -> Warning {
     Warning::new(
         "mains-lines",
         format!(
-            "\"{name}\" has lines at multiples of {} Hz, as mains hum makes them: {} (peak; others \
-             closer than {} Hz are not told apart); a machine that turns in step with the mains makes such lines \
-             as well",
+            "\"{name}\" has lines at multiples of {} Hz, as from mains hum: {} (peak; lines closer than {} Hz are not \
+             resolved); a machine running in step with the mains causes such lines as well",
             short(found.nominal_hz),
             lines.join(", "),
             rounded(found.resolution_hz, 2)

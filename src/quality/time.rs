@@ -112,8 +112,8 @@ pub fn stamps_in_channel(name: &str, channel: &Channel) -> Option<Warning> {
     Some(Warning::new(
         "rate-contradicts-stamps",
         format!(
-            "\"{name}\" rises like a time axis of {} Hz, the head of the file says {} Hz for it; find \
-             out which is right, and give it with --rate, or the column with --time-column",
+            "\"{name}\" rises like a time axis of {} Hz, but the header gives {} Hz for it; find out which is right, \
+             and give it with --rate, or the column with --time-column",
             number(found.stamped_hz, 6),
             number(found.stated_hz, 6)
         ),
@@ -124,7 +124,8 @@ fn missing(whose: &str, axis: &TimeAxis) -> Option<Warning> {
     if axis.rate_hz.is_some() {
         return None;
     }
-    let given = "what needs a rate refuses it unless one is given with --rate HZ, or the column of stamps with --time-column";
+    let given = "verbs that need a rate refuse it unless one is given with --rate HZ, or the column of time stamps \
+        with --time-column";
     let why = match axis.stamps_s.as_deref().map(Vec::as_slice) {
         // A list without messages has no rate.
         Some([]) => return None,
@@ -144,8 +145,8 @@ fn counted(events: &Events) -> Option<(&Event, &Event)> {
 fn backwards(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
     let (first, longest) = counted(&steps.backwards)?;
     let why = if -longest.step_s > SET_BACK * steps.typical_s {
-        "the clock was set back, two recordings were joined, or rows were written twice; split the file there, or remove the \
-         rows that are there already"
+        "the clock was set back, two recordings were joined, or rows were written twice; split the file there, or \
+         remove the duplicate rows"
     } else {
         "the samples are out of order"
     };
@@ -165,7 +166,7 @@ fn repeated(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
     Some(Warning::new(
         "repeated-stamps",
         format!(
-            "{whose}: {} the same as the one before, first {}: samples stored twice, or a clock that stood still",
+            "{whose}: {} the same as the previous one, first {}: samples stored twice, or a stopped clock",
             plural(steps.repeated.count, "time stamp"),
             axis.moment(first.from_s).short()
         ),
@@ -177,8 +178,8 @@ fn jumps(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
     Some(Warning::new(
         "clock-jump",
         format!(
-            "{whose}: the time stamps jump by {} s after {}, more than all of the rest takes: the \
-             clock was set, or two recordings were joined; split the file there",
+            "{whose}: the time stamps jump by {} s after {}, more than the rest of the record lasts: the clock was \
+             set, or two recordings were joined; split the file there",
             number(first.step_s, 4),
             axis.moment(first.from_s).short()
         ),
@@ -192,7 +193,7 @@ fn gaps(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
         "time-gaps",
         format!(
             "{whose}: {} in the time stamps, samples missing: about {} ({} %); the first after {}, the longest of {} s \
-             after {}; --fill linear bridges short ones",
+             after {}; --fill linear fills short ones",
             plural(steps.gaps.count, "gap"),
             number(steps.missing, 6),
             number(100.0 * steps.missing / (samples + steps.missing), 2),
@@ -208,9 +209,8 @@ fn jitter(whose: &str, steps: &Steps) -> Option<Warning> {
     Some(Warning::new(
         "time-jitter",
         format!(
-            "{whose}: the time stamps jitter about a step of {} s by {} % rms, {} % at most; \
-             --resample interpolates to a uniform step; if the stamps only say when samples arrived, give the recorder's rate \
-             with --rate HZ",
+            "{whose}: the time stamps jitter about a step of {} s by {} % rms, {} % at most; --resample interpolates \
+             to a uniform step; if the stamps are arrival times, give the recorder's rate with --rate HZ",
             number(steps.typical_s, 6),
             number(100.0 * jitter.std, 3),
             number(100.0 * jitter.peak, 3)
@@ -234,8 +234,8 @@ fn rounded_stamps(whose: &str, rounded: &Rounded, axis: &TimeAxis, has_gaps: boo
     Warning::new(
         "rounded-time-stamps",
         format!(
-            "{whose}: the time stamps are written in multiples of {} s; but for {but_for} they are \
-             uniform, and all of them together give {} Hz{allowed}{}",
+            "{whose}: the time stamps are written in multiples of {} s; apart from {but_for} they are uniform, and \
+             together they give {} Hz{allowed}{}",
             number(rounded.quantum_s, 3),
             number(1.0 / rounded.step_s, 9),
             same_stamps(rounded.quantum_s / rounded.step_s)

@@ -228,7 +228,7 @@ pub(crate) fn resampled(
     );
     if done.gaps > 0 {
         message += &format!(
-            "; bridged by straight lines: {}, the longest of {} s; do not trust results from there",
+            "; filled by linear interpolation: {}, the longest of {} s; do not trust results there",
             print::plural(done.gaps, "gap"),
             print::rounded(done.longest_step_s, 4)
         );

@@ -33,7 +33,7 @@ pub const REVERSED: &str =
 /// Note on stamps in a column or vector whose unit is unknown or unusable in the file.
 pub fn seconds_assumed(name: &str, unit: Option<&str>) -> String {
     let says = match unit {
-        Some(unit) => format!("gives the unit \"{unit}\", which is none of time"),
+        Some(unit) => format!("gives the unit \"{unit}\", which is not a unit of time"),
         None => "gives no unit".to_owned(),
     };
     format!("\"{name}\" {says}: seconds were assumed")

@@ -200,7 +200,7 @@ pub(crate) fn unit_of(
         Warning::new(
             "unit-overrides-heading",
             format!(
-                "\"{heading}\" says {}, {flag} says {text}; {text} was taken",
+                "\"{heading}\" says {}, {flag} says {text}; {text} was used",
                 named.text
             ),
         )
@@ -218,7 +218,7 @@ pub(crate) fn overridden(reading: &Reading, stamps_in: &str, stamps_s: &[f64]) -
     Some(Warning::new(
         "rate-overrides-stamps",
         format!(
-            "the stamps in \"{stamps_in}\" come at {} Hz, --rate says {} Hz; {} Hz was taken",
+            "the stamps in \"{stamps_in}\" give {} Hz, --rate says {} Hz; {} Hz was used",
             digits::text(stamped_hz, 7),
             digits::text(rate_hz, 7),
             digits::text(rate_hz, 7)
@@ -231,8 +231,8 @@ pub(crate) fn contradicted(whose: &str, found: &Contradiction) -> Warning {
     Warning::new(
         "rate-contradicts-stamps",
         format!(
-            "{whose}: the head of the file says {} Hz, the time stamps come at {} Hz; find out which \
-             is right, and give it with --rate if it is not the stamps",
+            "{whose}: the header gives {} Hz, the time stamps give {} Hz; find out which is right, and give it with \
+             --rate if it is not the stamps",
             digits::text(found.stated_hz, 6),
             digits::text(found.stamped_hz, 6)
         ),

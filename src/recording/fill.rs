@@ -23,7 +23,7 @@ const LONGEST: f64 = 10_000.0;
 pub struct FilledSpan {
     /// Time of the sample before it, in s.
     pub from_s: f64,
-    /// Time of the sample behind it, in s.
+    /// Time of the sample after it, in s.
     pub to_s: f64,
     /// Samples that were filled in.
     pub samples: usize,
@@ -79,7 +79,7 @@ impl Recording {
         let marks = holes.iter().filter(is_mark).count();
         if let Some(warning) = warning.as_mut().filter(|_| marks > 0) {
             warning.message += &format!(
-                "; {} read 9.91e37 or \u{b1}9.9e37, with which instruments mark no value or over range",
+                "; {} read 9.91e37 or \u{b1}9.9e37, which instruments write for no value or over range",
                 plural(marks, "cell")
             );
         }
@@ -148,7 +148,7 @@ fn said(
 ) -> Option<Warning> {
     let count: usize = spans.iter().map(|span| span.samples).sum();
     let how = match fill {
-        Fill::Hold => "the last value before them",
+        Fill::Hold => "the last preceding value",
         _ => "straight lines",
     };
     let shown = spans.iter().take(SAID);
@@ -163,7 +163,7 @@ fn said(
         Warning::new(
             "filled",
             format!(
-                "\"{name}\": {} at {} filled in with {how}: {}{more}; do not trust the result there",
+                "\"{name}\": {} at {} filled with {how}: {}{more}; do not trust the result there",
                 plural(count, "missing sample"),
                 plural(spans.len(), "place"),
                 shown.join(", ")

@@ -74,7 +74,7 @@ impl JoinedBreaks {
         let time = |stamp: f64| grid.time_text(stamp);
         let gaps = self.first_gap.map(|gap| {
             format!(
-                "leave out {} s in {} (about {}), first from {} to {}",
+                "skip {} s in {} (about {}), first from {} to {}",
                 digits::text(self.missing * grid.seconds_per_unit, 4),
                 plural(self.gaps, "gap"),
                 plural((self.missing / grid.step).round() as usize, "sample"),
@@ -95,9 +95,9 @@ impl JoinedBreaks {
             Warning::new(
                 "rate-joins-gaps",
                 format!(
-                    "{source}: the time stamps {}; with --rate the samples on both sides are joined, and all times after \
-                     that are wrong by it. If the stamps are right, leave out --rate, and bridge gaps with --fill linear or \
-                     leave them out with --range",
+                    "{source}: the time stamps {}; --rate joins the samples on both sides, and all later times are \
+                     wrong by that amount. If the stamps are right, omit --rate, and fill gaps with --fill linear or \
+                     exclude them with --range",
                     said.join(" and ")
                 ),
             )

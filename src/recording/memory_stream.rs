@@ -110,7 +110,7 @@ pub(crate) fn check_size(channel: &Channel) -> Result<(), Failure> {
     Err(Failure::failed(
         ErrorCode::InvalidSample,
         format_args!(
-            "sample {} of \"{}\" is {:e}, which no instrument reads; correct it, or leave it out",
+            "sample {} of \"{}\" is {:e}, beyond any instrument; correct or exclude it",
             row + 1,
             channel.name,
             channel.samples[row]
@@ -139,7 +139,7 @@ fn refuse_holes(channel: &Channel, by_stamps: bool) -> Result<(), Failure> {
         HoleKind::Empty => "is empty",
         HoleKind::NonFinite => "is not a finite number",
         HoleKind::InstrumentsMark => {
-            "is 9.91e37 or \u{b1}9.9e37, with which instruments mark no value or over range"
+            "is 9.91e37 or \u{b1}9.9e37, which instruments write for no value or over range"
         }
         HoleKind::Text => "is a text, expected a number",
     };

@@ -95,11 +95,11 @@ impl Recording {
 /// A part of a file that was recorded on its own: after a trigger, or after a pause.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Segment {
-    /// Name for people: `segment 2`.
+    /// Display name: `segment 2`.
     pub name: String,
     /// Start after the first segment, in s; `null` if the file does not say.
     pub start_s: Option<f64>,
-    /// Its date and time: in ISO 8601 where they can be read in one way only, as written otherwise.
+    /// Its date and time: in ISO 8601 where unambiguous, otherwise as written.
     #[serde(rename = "start_time")]
     pub start_text: Option<String>,
 }

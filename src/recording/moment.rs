@@ -97,7 +97,7 @@ impl Moment {
 struct StartMoment {
     /// Time of the first sample on the time axis of the record, in s.
     start_s: f64,
-    /// The same in ns, if the clock does not begin with the record.
+    /// The same in ns, if the clock does not start with the record.
     start_ns: Option<i64>,
     /// Its date and time in UTC, if the clock counts from 1970.
     start_time: Option<String>,

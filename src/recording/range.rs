@@ -99,7 +99,7 @@ impl Recording {
             });
             return Err(Failure::failed(
                 ErrorCode::RangeEmpty,
-                format_args!("no sample lies within --range{ends}"),
+                format_args!("--range contains no samples{ends}"),
             ));
         }
         Ok(())

@@ -59,8 +59,8 @@ pub(crate) fn same_stamps(rows: f64) -> String {
     let whole = rows.round();
     match (2.0..=MOST_COPIES).contains(&whole) && (rows / whole - 1.0).abs() < 1e-6 {
         true => format!(
-            "; each stamp stands in {whole} rows: if these repeat their values, too, every row was written {whole} times, and \
-             only one of each belongs to the record"
+            "; each stamp occurs in {whole} rows: if these also repeat their values, every row was written {whole} \
+             times, and only one of each belongs to the record"
         ),
         false => String::new(),
     }
@@ -200,8 +200,8 @@ impl StampGrid {
         Err(Failure::failed(
             ErrorCode::IrregularTime,
             format_args!(
-                "the time stamps are rounded to {} s and allow {}; a resonance cannot be divided out with that: give \
-                 the recorder's rate with --rate HZ",
+                "the time stamps are rounded to {} s and allow {}; that is too uncertain to divide out a resonance: \
+                 give the recorder's rate with --rate HZ",
                 digits::text(self.quantum * self.seconds_per_unit, 3),
                 rates_of([step_s * (1.0 - part), step_s * (1.0 + part)])
             ),
@@ -217,8 +217,8 @@ impl StampGrid {
             Warning::new(
                 "rounded-time-stamps",
                 format!(
-                    "{source}: the time stamps are rounded to {} s; but for that they are uniform, and all of them \
-                     together give {} Hz (to within {} Hz){}",
+                    "{source}: the time stamps are rounded to {} s; apart from that they are uniform, and together \
+                     they give {} Hz (to within {} Hz){}",
                     digits::text(self.quantum * of_seconds, 3),
                     digits::text(rate_hz, 9),
                     digits::text(rate_hz * self.quantum / span, 2),
@@ -269,8 +269,8 @@ impl StampGrid {
         let Self { unit, step, .. } = self;
         let (before, after) = (missing.at.before, missing.at.after);
         format!(
-            "about {} missing between {} and {}: there the time stamps, which are rounded to {} {unit}, leave the uniform \
-             line of {} Hz by {} {unit}; use --fill linear to bridge the gap, or --range to leave it out",
+            "about {} missing between {} and {}: there the time stamps, which are rounded to {} {unit}, leave the \
+             uniform line of {} Hz by {} {unit}; use --fill linear to fill the gap, or --range to exclude it",
             match missing.samples {
                 1 => "1 sample is".to_owned(),
                 samples => format!("{samples} samples are"),
@@ -331,9 +331,8 @@ impl StampGrid {
         let (before, after) = (time(found.before), time(found.after));
         if found.after < found.before {
             return format!(
-                "time runs backwards, from {before} to {after}: the clock was set \
-                 back, two recordings were joined, or rows were written twice; split the file there, or remove the rows that \
-                 are there already"
+                "time runs backwards, from {before} to {after}: the clock was set back, two recordings were joined, or \
+                 rows were written twice; split the file there, or remove the duplicate rows"
             );
         }
         if found.after == found.before {
@@ -345,7 +344,7 @@ impl StampGrid {
         let length = (found.after - found.before) / step;
         let is_gap = is_gap(length, 0.0);
         let remedy = match is_gap {
-            true => "use --fill linear to bridge the gap, or --range to leave it out",
+            true => "use --fill linear to fill the gap, or --range to exclude it",
             false => "use --resample to interpolate, or --rate HZ if the stamps are wrong",
         };
         format!(
@@ -472,8 +471,8 @@ pub(super) fn check_resampled(rate_hz: f64, recorded_hz: f64) -> Result<(), Fail
     Err(Failure::failed(
         ErrorCode::IrregularTime,
         format_args!(
-            "the stamps come at {} Hz; --resample with --rate {} would fold high frequencies down or \
-         invent samples. Resample near the recorded rate, and limit the band with --band",
+            "the stamps come at {} Hz; --resample with --rate {} would alias high frequencies or invent samples. \
+             Resample near the recorded rate, and limit the band with --band",
             digits::text(recorded_hz, 6),
             digits::text(rate_hz, 6)
         ),

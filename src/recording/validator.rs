@@ -314,8 +314,8 @@ impl StreamValidator {
             self.warnings.push(Warning::new(
                 "rate-drift",
                 format!(
-                    "{}: the first rows are {} Hz apart, the whole record {} Hz on average; the \
-                     rate of the first rows was used",
+                    "{}: the rate of the first rows is {} Hz, that of the whole record {} Hz on average; the rate of \
+                     the first rows was used",
                     self.source,
                     crate::io::digits::text(rate_hz, 7),
                     crate::io::digits::text(rate_hz * samples / steps, 7)

@@ -116,8 +116,8 @@ impl RecordedLevels {
         Some(Warning::new(
             "zero-far-from-record",
             format!(
-                "[recorder] zero = \"{}\" is more than {} times as large as anything in the record: the result is an offset of about \
-                 {} {unit} and little else; check the value of the zero and its unit",
+                "[recorder] zero = \"{}\" is more than {} times any sample of the record: the result is little more \
+                 than an offset of about {} {unit}; check the value of the zero and its unit",
                 self.zero,
                 rounded(1.0 / NEAR_NOTHING, 2),
                 rounded(offset * scale, 3)
@@ -136,7 +136,8 @@ impl RecordedLevels {
             Warning::new(
                 "volts-unusual",
                 format!(
-                    "the record reaches {} V, more than bridge amplifiers and recorders give: is it in mV? Then say --unit mV",
+                    "the record reaches {} V, more than bridge amplifiers and recorders output; if it is in mV, give \
+                     --unit mV",
                     rounded(volts.fold(0.0, f64::max), 3)
                 ),
             )
@@ -205,7 +206,7 @@ impl Calibration {
             Failure::failed(
                 ErrorCode::UnitUnclear,
                 format_args!(
-                    "the channel \"{name}\" does not say its unit; give it with --unit \"N m\" (or \"ft lbf\", N)"
+                    "the channel \"{name}\" has no unit; give it with --unit \"N m\" (or \"ft lbf\", N)"
                 ),
             )
         })?;
@@ -299,7 +300,7 @@ impl Stand {
             Warning::new(
                 "zero-not-used",
                 format!(
-                    "[recorder] zero of {} is in {} and the record in {}: it was not subtracted",
+                    "[recorder] zero of {} is in {}, but the record is in {}: the zero was not subtracted",
                     self.file,
                     of.usual_unit().0,
                     named.text
@@ -370,15 +371,14 @@ fn without_unit(channel: RecordedChannel) -> Failure {
         None => Failure::failed(
             ErrorCode::UnitUnclear,
             format_args!(
-                "the channel \"{name}\" does not say its unit; give it: --unit V for what an amplifier or recorder put out \
-                 (mV/V, mA, Hz, ustrain likewise), --unit \"N m\" (or N) for what is torque (or force) already, as from \
-                 simulate"
+                "the channel \"{name}\" has no unit; give it: --unit V for the output of an amplifier or recorder \
+                 (likewise mV/V, mA, Hz, ustrain), --unit \"N m\" (or N) for a torque (or force), as from simulate"
             ),
         ),
         Some(OF_FULL_SCALE) => Failure::failed(
             ErrorCode::UnitUnclear,
             format_args!(
-                "the samples of the channel \"{name}\" are fractions of full scale, and the file does not say what that is; \
+                "the samples of the channel \"{name}\" are fractions of full scale, which the file does not state; \
                  give it with its unit, as --full-scale \"10 V\""
             ),
         ),
@@ -404,9 +404,9 @@ fn no_torque(channel: &str, named: &NamedUnit) -> Failure {
         return Failure::failed(
             ErrorCode::UnitUnclear,
             format_args!(
-                "the channel \"{channel}\" is in \"{text}\", which could be the output of a bridge over its \
-                 excitation, a strain, or part of a full scale; give --unit \"{text} V/V\" for the first or \"{text} \
-                 strain\" for the second"
+                "the channel \"{channel}\" is in \"{text}\", which could be bridge output over excitation, a strain, \
+                 or a fraction of full scale; give --unit \"{text} V/V\" for the first or \"{text} strain\" for the \
+                 second"
             ),
         );
     }
@@ -422,16 +422,16 @@ fn no_torque(channel: &str, named: &NamedUnit) -> Failure {
         return Failure::failed(
             ErrorCode::UnitUnclear,
             format_args!(
-                "the channel \"{channel}\" is in \"{text}\", which can be read with a force or with a mass; \
-                 {torque}; \"{mass}\" does not become torque"
+                "the channel \"{channel}\" is in \"{text}\", which can be read with a force or with a mass; {torque}; \
+                 \"{mass}\" cannot be converted to torque"
             ),
         );
     }
     Failure::failed(
         ErrorCode::UnitUnsuitable,
         format_args!(
-            "the channel \"{channel}\" is in \"{text}\" ({}), which does not become torque; expected volts, mV/V, \
-             mA, Hz, strain, torque or force",
+            "the channel \"{channel}\" is in \"{text}\" ({}), which cannot be converted to torque; expected volts, \
+             mV/V, mA, Hz, strain, torque or force",
             named.unit.dimension()
         ),
     )

@@ -20,7 +20,7 @@ pub(super) fn unusual_modulus(beam: &BeamDrawing) -> Option<Warning> {
         Warning::new(
             "modulus-unusual",
             format!(
-                "[beam] elastic_modulus is {} GPa, which no usual beam has: steel has 200 GPa; check its unit",
+                "[beam] elastic_modulus is {} GPa, unlike any common beam material: steel has 200 GPa; check its unit",
                 short(modulus_pa / 1e9)
             ),
         )
@@ -76,7 +76,7 @@ pub(super) fn beam(section: &Section) -> Result<BeamDrawing, Failure> {
     if !SOLID_PA.contains(&modulus.value()) {
         return Err(section.fail(
             "elastic_modulus",
-            "no solid has such a modulus; steel has \"200 GPa\", aluminium \"70 GPa\"",
+            "impossible modulus; steel has \"200 GPa\", aluminium \"70 GPa\"",
         ));
     }
     let radius = section.positive("radius", Kind::Length)?;

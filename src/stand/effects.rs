@@ -174,8 +174,8 @@ impl Stand {
                 ErrorCode::NotInvertible,
                 format_args!(
                     "the effect \"{}\" acts at the gage, and how far it moves each mode there does not follow from \
-                     residues of both signs; give shape_at_load and shape_at_gage of [[modes]] in place of residue, \
-                     or leave the effect out",
+                     residues of both signs; give shape_at_load and shape_at_gage of [[modes]] instead of residue, or \
+                     leave the effect out",
                     torque.effect.name
                 ),
             )
@@ -195,8 +195,8 @@ impl Stand {
             return Err(Failure::failed(
                 ErrorCode::NotInvertible,
                 format_args!(
-                    "the effect \"{}\" is no response over frequency; leave it out to use the plain stand, or take \
-                     it out of the record with compensate",
+                    "the effect \"{}\" has no frequency response; remove it to use the plain stand, or remove its \
+                     effect from the record with compensate",
                     link.effect
                 ),
             )

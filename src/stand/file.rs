@@ -53,7 +53,7 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
         let hint = if text.contains(SCHEMA) {
             ""
         } else {
-            "; this does not look like a stand file, which begins with schema = \"torqcomp.stand/1\""
+            "; this does not look like a stand file, which starts with schema = \"torqcomp.stand/1\""
         };
         source.at(error.span().map(|span| span.start), format_args!("{message}{hint}"))
     })?;
@@ -120,7 +120,7 @@ fn oddities(stand: &Stand) -> Vec<Warning> {
         Warning::new(
             "damping-above-one",
             format!(
-                "{}: the damping ratio is {}, so that the stand does not ring; if a percentage is meant, write 7 % as 0.07",
+                "{}: the damping ratio is {}, so the stand does not ring; if this is a percentage, write 7 % as 0.07",
                 stand.file,
                 short(ratio)
             ),
@@ -143,19 +143,20 @@ fn oddities(stand: &Stand) -> Vec<Warning> {
         .collect()
 }
 
-/// A warning if the diagnosis that refined the stand could not explain its records.
+/// A warning if the diagnosis that refined the stand did not explain its records.
 fn left_unexplained(stand: &Stand) -> Option<Warning> {
     let Diagnosed { verdict, .. } = &stand.diagnosed;
     let ending = match verdict.as_deref()? {
-        "unexplained" => "could not explain its records",
-        "partly-explained" => "explained its records in part only",
+        "unexplained" => "did not explain its records",
+        "partly-explained" => "explained its records only in part",
         _ => return None,
     };
     Some(Warning::new(
         "diagnosis-incomplete",
         format!(
-            "{}: the diagnosis that wrote this file {ending} ({}): its constants and effects make up for what the model lacks, and \
-             torque taken through it can be worse than through the file before; compare both on a record with a known torque",
+            "{}: the diagnosis that wrote this file {ending} ({}): its constants and effects compensate for model \
+             errors, so torque may be less accurate than with the previous file; compare both on a record with a known \
+             torque",
             stand.file,
             verdict.as_deref().unwrap_or_default(),
         ),
@@ -168,8 +169,8 @@ fn assumed_order(stand: &Stand) -> Option<Warning> {
         Warning::new(
             "low-pass-order-assumed",
             format!(
-                "{}: [recorder] low_pass does not say its order: 1, an RC low-pass, was assumed; give low_pass_order (filters \
-                 against aliasing have 2 to 8)",
+                "{}: the order of [recorder] low_pass is not given: 1, an RC low-pass, was assumed; give \
+                 low_pass_order (anti-aliasing filters have 2 to 8)",
                 stand.file
             ),
         )
@@ -201,7 +202,7 @@ fn one_calibration(top: &Section, stand: &Stand) -> Result<(), Failure> {
     {
         return Err(top.fail(
             "calibration",
-            format_args!("the sensitivity does not go with the zero of [recorder]: {why}"),
+            format_args!("the sensitivity does not match the zero of [recorder]: {why}"),
         ));
     }
     Ok(())

@@ -25,8 +25,8 @@ impl Stand {
             Warning::new(
                 "gain-not-used",
                 format!(
-                    "[calibration] of {} is torque per recorded volt, so that [recorder] gain = {gain} was not used; if it is per \
-                     volt of the bridge, divide it by the gain, and leave the gain out",
+                    "[calibration] of {} is torque per recorded volt, so [recorder] gain = {gain} was not used; if it \
+                     is per volt of the bridge, divide it by the gain, and omit the gain",
                     self.file
                 ),
             )

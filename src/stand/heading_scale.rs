@@ -10,8 +10,8 @@ pub(super) fn unapplied(heading: &str) -> Option<Warning> {
     Some(Warning::new(
         "scale-in-heading",
         format!(
-            "the heading \"{heading}\" names a scale, \"{scale}\", which was not applied to the numbers: they were taken as they \
-             are; if that is wrong, rename the column and scale it"
+            "the heading \"{heading}\" contains a scale factor, \"{scale}\", which was not applied to the numbers; if \
+             it should be, scale the column and rename it"
         ),
     ))
 }

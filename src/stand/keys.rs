@@ -65,11 +65,11 @@ use Takes::{Quantity, RecordQuantity, Section, Text, Whole, Word};
 /// All sections, in the usual order of a stand file.
 #[rustfmt::skip]
 pub(crate) const SECTIONS: &[StandSection] = &[
-    ("", "What the file is, and its sections.", &[
+    ("", "Identification of the file, and its sections.", &[
         ("schema", Text, "`\"torqcomp.stand/1\"`; required"),
         ("name", Text, "name of the stand"),
         ("mechanics", Section, "response of the stand"),
-        ("modes", Section, "modes of the stand in place of one response, one section each"),
+        ("modes", Section, "modes of the stand instead of a single response, one section each"),
         ("calibration", Section, "measured calibration"),
         ("beam", Section, "drawing of the beam"),
         ("parts", Section, "parts that make up the inertia, one section each"),
@@ -77,47 +77,52 @@ pub(crate) const SECTIONS: &[StandSection] = &[
         ("gage", Section, "strain gage"),
         ("bridge", Section, "bridge and its wiring"),
         ("recorder", Section, "amplifier and recorder"),
-        ("effects", Section, "what the plain stand lacks, one section each"),
-        ("diagnosed", Section, "what `diagnose -o` wrote about itself"),
+        ("effects", Section, "effects that the plain stand lacks, one section each"),
+        ("diagnosed", Section, "written by `diagnose -o` about the diagnosis"),
     ]),
     ("[mechanics]", "`J θ'' + f θ' + K θ = T`, as inertia, damping and stiffness, or as natural frequency and damping ratio.", &[
         ("inertia", Quantity(Kind::Inertia), "`J`"),
         ("damping", Quantity(Kind::AngularDamping), "`f`"),
         ("stiffness", Quantity(Kind::AngularStiffness), "`K`"),
-        ("common_std", Quantity(Kind::Ratio), "relative standard uncertainty that these three share, as where two follow from a declared third (`identify` and `diagnose` write it); the `std` of each includes it, and it cancels in the response"),
+        ("common_std", Quantity(Kind::Ratio), "relative standard uncertainty common to these three, as when two follow \
+            from a declared third (`identify` and `diagnose` write it); the `std` of each includes it, and it cancels \
+            in the response"),
         ("correlation_inertia_damping", Quantity(Kind::Ratio), "correlation coefficient of the errors of both, -1 to 1; 0 by default (`identify response` writes it)"),
-        ("correlation_inertia_stiffness", Quantity(Kind::Ratio), "the same of these"),
-        ("correlation_damping_stiffness", Quantity(Kind::Ratio), "the same of these"),
+        ("correlation_inertia_stiffness", Quantity(Kind::Ratio), "likewise"),
+        ("correlation_damping_stiffness", Quantity(Kind::Ratio), "likewise"),
         ("natural_frequency", Quantity(Kind::Frequency), "`√(K/J)/2π`, in place of the three"),
         ("damping_ratio", Quantity(Kind::Ratio), "`f/(2 √(K J))`, with `natural_frequency`"),
-        ("static_gain", RecordQuantity, "recorded over applied quantity at rest, `\"1 V/V\"` or `\"2.5 mV/N\"`, for stands that do not measure torque; with `natural_frequency` or `[[modes]]` only"),
+        ("static_gain", RecordQuantity, "static ratio of recorded to applied quantity, `\"1 V/V\"` or `\"2.5 mV/N\"`, \
+            for stands that do not measure torque; with `natural_frequency` or `[[modes]]` only"),
         ("measures", Word, "`displacement` (default, or the torque of the beam), `speed` or `acceleration`: what is recorded; `static_gain` is then that of the displacement, with the unit of the record, as in `\"3e-7 (m/s^2)/N\"`"),
     ]),
     ("[[modes]]", "A mode of the stand, in place of the keys of `[mechanics]` above: the response is the sum of `(r + q s/ω) ω²/(s² + 2ζω s + ω²)` over all modes. What the residues leave of 1 is the compliance of modes above the band.", &[
         ("natural_frequency", Quantity(Kind::Frequency), "`ω/2π`"),
         ("damping_ratio", Quantity(Kind::Ratio), "`ζ`"),
-        ("residue", Quantity(Kind::Ratio), "`r`: its part of the response at rest"),
-        ("quadrature", Quantity(Kind::Ratio), "`q`: the part that goes with the speed; 0 by default"),
-        ("shape_at_load", Quantity(Kind::Ratio), "in place of `residue`, of all modes: shape of the mode where the torque acts, in any one scale of modes of unit modal mass"),
-        ("shape_at_gage", Quantity(Kind::Ratio), "the same where the gage is"),
+        ("residue", Quantity(Kind::Ratio), "`r`: its fraction of the static response"),
+        ("quadrature", Quantity(Kind::Ratio), "`q`: the part proportional to the speed; 0 by default"),
+        ("shape_at_load", Quantity(Kind::Ratio), "instead of `residue`, for all modes: mode shape where the torque \
+            acts, of modes of unit modal mass in any common scale"),
+        ("shape_at_gage", Quantity(Kind::Ratio), "likewise at the gage"),
         ("correlation_frequency_damping", Quantity(Kind::Ratio), "correlation coefficient of the errors of both, -1 to 1; 0 by default (`identify response` writes it)"),
-        ("correlation_frequency_residue", Quantity(Kind::Ratio), "the same of these"),
-        ("correlation_damping_residue", Quantity(Kind::Ratio), "the same of these"),
-        ("correlation_frequency_quadrature", Quantity(Kind::Ratio), "the same of these"),
-        ("correlation_damping_quadrature", Quantity(Kind::Ratio), "the same of these"),
-        ("correlation_residue_quadrature", Quantity(Kind::Ratio), "the same of these"),
-        ("source", Text, "where the numbers come from, for people"),
+        ("correlation_frequency_residue", Quantity(Kind::Ratio), "likewise"),
+        ("correlation_damping_residue", Quantity(Kind::Ratio), "likewise"),
+        ("correlation_frequency_quadrature", Quantity(Kind::Ratio), "likewise"),
+        ("correlation_damping_quadrature", Quantity(Kind::Ratio), "likewise"),
+        ("correlation_residue_quadrature", Quantity(Kind::Ratio), "likewise"),
+        ("source", Text, "where the numbers come from (informative)"),
     ]),
     ("[calibration]", "A measured calibration, in one of six forms; it replaces gage, bridge and recorder gain. The `std` of each quantity enters the stated uncertainty.", &[
         ("torque_per_volt", Quantity(Kind::TorquePerVolt), "torque per volt as recorded"),
         ("torque_per_ratio", Quantity(Kind::TorquePerRatio), "torque per bridge output over excitation"),
         ("sensitivity", RecordQuantity, "change of the output from no load to `rated_torque`, with its sign: `\"2.0012 mV/V\"`, `\"10 V\"`, `\"8 mA\"` or `\"30 kHz\"`"),
-        ("rated_torque", Quantity(Kind::Torque), "torque of `sensitivity` or `frequency_at_rated`; beside another form the torque that the transducer is made for. A result 1.5 times beyond it is warned about"),
+        ("rated_torque", Quantity(Kind::Torque), "torque of `sensitivity` or `frequency_at_rated`; with another form \
+            the transducer's rated torque. A result beyond 1.5 times it causes a warning"),
         ("zero_frequency", Quantity(Kind::Frequency), "output at no load of a transducer with frequency output"),
         ("frequency_at_rated", Quantity(Kind::Frequency), "its output at `rated_torque`"),
         ("lever_arm", Quantity(Kind::Length), "distance from the shaft at which a recorded force acts"),
-        ("points", Section, "a table of points, joined by straight lines, and continued by 20 % of its range"),
-        ("degree", Whole, "1, 2 or 3: joins the points by a polynomial of least squares"),
+        ("points", Section, "a table of points, interpolated linearly, and extrapolated by 20 % of its range"),
+        ("degree", Whole, "1, 2 or 3: degree of a least-squares polynomial through the points"),
     ]),
     ("[[calibration.points]]", "A point of the calibration, also written `points = [{ reading = \"1 mV/V\", torque = \"25 N m\" }, …]`.", &[
         ("reading", RecordQuantity, "output in V, mV/V, mA, Hz, ustrain or N"),
@@ -154,8 +159,8 @@ pub(crate) const SECTIONS: &[StandSection] = &[
         ("outer_radius", Quantity(Kind::Length), "of a hollow cylinder"),
     ]),
     ("[friction]", "Slope of a friction force over speed, from which the damping is predicted.", &[
-        ("force_change", Quantity(Kind::Force), "rise of the force"),
-        ("speed_change", Quantity(Kind::AngularSpeed), "rise of the speed"),
+        ("force_change", Quantity(Kind::Force), "increase of the force"),
+        ("speed_change", Quantity(Kind::AngularSpeed), "increase of the speed"),
         ("radius", Quantity(Kind::Length), "at which the force acts"),
     ]),
     ("[gage]", "`ΔR/R₀ = GF (T₀/T) ε + C₂ (T₀/T)² ε²`.", &[
@@ -164,7 +169,8 @@ pub(crate) const SECTIONS: &[StandSection] = &[
         ("resistance", Quantity(Kind::Resistance), "before bonding"),
         ("bonded_resistance", Quantity(Kind::Resistance), "after bonding: the prestrain follows"),
         ("reference_temperature", Quantity(Kind::TemperatureAbsolute), "`T₀`; 25 °C by default"),
-        ("bonding_temperature", Quantity(Kind::TemperatureAbsolute), "at which the bonded resistance was measured; that of use by default"),
+        ("bonding_temperature", Quantity(Kind::TemperatureAbsolute), "at which the bonded resistance was measured; \
+            `temperature` by default"),
         ("temperature", Quantity(Kind::TemperatureAbsolute), "`T`, that of use; `T₀` by default"),
         ("resistance_drift", Quantity(Kind::Ratio), "change of the unbonded resistance from bonding to use, as a fraction"),
     ]),
@@ -182,17 +188,19 @@ pub(crate) const SECTIONS: &[StandSection] = &[
         ("low_pass", Quantity(Kind::Frequency), "cut-off of a Butterworth low-pass"),
         ("low_pass_order", Whole, "1 (default, an RC low-pass) to 16"),
         ("delay", Quantity(Kind::Time), "time by which the record lags"),
-        ("input_resistance", Quantity(Kind::Resistance), "load of the bridge"),
+        ("input_resistance", Quantity(Kind::Resistance), "resistance loading the bridge"),
     ]),
-    ("[[effects]]", "What the plain stand lacks; with the parameters of its kind and form, see [effects.md](effects.md).", &[
+    ("[[effects]]", "Effects that the plain stand lacks, with the parameters of their kind and form: see \
+        [effects.md](effects.md).", &[
         ("kind", Word, "name of the effect, such as `cubic-stiffness`; required"),
         ("form", Word, "its form; the first one by default"),
-        ("source", Text, "where the parameters come from, for people"),
+        ("source", Text, "where the parameters come from (informative)"),
     ]),
-    ("[diagnosed]", "What `diagnose -o` wrote about the records; `simulate` and `compensate` use the unit and the constants.", &[
-        ("applied_unit", Text, "unit of the applied quantity, for people"),
-        ("verdict", Text, "how the diagnosis ended, for people"),
-        ("records", Text, "the records, for people"),
+    ("[diagnosed]", "Written by `diagnose -o` about the records; `simulate` and `compensate` use the unit and the \
+        constants.", &[
+        ("applied_unit", Text, "unit of the applied quantity (informative)"),
+        ("verdict", Text, "verdict of the diagnosis (informative)"),
+        ("records", Text, "the records (informative)"),
         ("measured_unit", Text, "unit of the record"),
         ("offset", RecordQuantity, "constant in the record"),
         ("shift", RecordQuantity, "displacement by a constant load"),

@@ -145,7 +145,7 @@ fn finish(section: &Section) -> Result<(), Failure> {
         "",
         match taken[..] {
             [one] => format!("{one} alone does not convert a record; {HOW}"),
-            _ => format!("{} do not go together; {HOW}", taken.join(" and ")),
+            _ => format!("{} cannot be combined; {HOW}", taken.join(" and ")),
         },
     ))
 }
@@ -264,7 +264,7 @@ fn points(section: &Section) -> Result<MeasuredCalibration, Failure> {
         if signal.is_some_and(|signal| signal != of) {
             return Err(row.fail(
                 "reading",
-                "the readings are in different kinds of units; use one",
+                "the readings have different kinds of unit; use one",
             ));
         }
         signal = Some(of);

@@ -28,8 +28,8 @@ pub(super) fn unusual_gage_factor(gage: &GageData) -> Option<Warning> {
         Warning::new(
             "gage-factor-unusual",
             format!(
-                "[gage] gage_factor is {}, which no usual gage has: metal foil has about 2, semiconductors 50 to 180; a torque \
-                 from this gage is as much too large or too small",
+                "[gage] gage_factor is {}, unlike any common gage: metal foil has about 2, semiconductors 50 to 180; \
+                 the torque is wrong by the same factor",
                 short(factor)
             ),
         )
@@ -139,10 +139,7 @@ fn leads(section: &Section) -> Result<Leads, Failure> {
         (Some(_), Some(lead_ohm)) => Ok(Leads::FourWire { lead_ohm }),
         (None, Some(_)) => Err(section.fail(
             "lead_resistance",
-            format_args!(
-                "say how the wires run: wiring = one of {}",
-                wires.join(", ")
-            ),
+            format_args!("give the wiring: wiring = one of {}", wires.join(", ")),
         )),
     }
 }
@@ -171,10 +168,7 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
     let cutoff = section.positive_if_any("low_pass", Kind::Frequency)?;
     let order = section.whole("low_pass_order")?;
     if order.is_some() && cutoff.is_none() {
-        return Err(section.fail(
-            "low_pass_order",
-            "say where the low-pass is: low_pass = \"5 kHz\"",
-        ));
+        return Err(section.fail("low_pass_order", "give the cut-off: low_pass = \"5 kHz\""));
     }
     let poles = u32::try_from(order.unwrap_or(1))
         .map_err(|_| section.fail("low_pass_order", "expected a whole number from 1 to 16"))?;

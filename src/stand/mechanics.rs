@@ -87,8 +87,8 @@ impl Mechanics {
             Warning::new(
                 "residues-do-not-add-up",
                 format!(
-                    "{file}: the residues of [[modes]] add up to {}, so that {} of the response at rest is left to modes above \
-                     the band; residues are parts of 1: check them",
+                    "{file}: the residues of [[modes]] add up to {}, which leaves {} of the static response to modes \
+                     above the band; check them: residues are fractions of 1",
                     short(1.0 - left),
                     short(left)
                 ),
@@ -117,7 +117,7 @@ fn one_mode(section: &Section) -> Result<Mechanics, Failure> {
         if common > 0.0 && correlations != [0.0; 3] {
             return Err(section.fail(
                 "common_std",
-                "the correlations include what the three constants share; keep one of them",
+                "the correlations already include common_std; keep one of them",
             ));
         }
         let own = |estimate: &Estimate| own_std(section, estimate, common);
@@ -181,7 +181,7 @@ fn own_std(section: &Section, estimate: &Estimate, common: f64) -> Result<Option
     if shared > std * (1.0 + ROUNDED) {
         return Err(section.fail(
             "common_std",
-            "expected no more than the relative std of inertia, damping and stiffness, which hold it",
+            "expected no more than the relative std of inertia, damping and stiffness, which include it",
         ));
     }
     Ok(Some((std * std - shared * shared).max(0.0).sqrt()))

@@ -53,8 +53,8 @@ pub(super) fn declared_modes(sections: &[Section]) -> Result<Vec<DeclaredMode>, 
         if let Some(other) = read.iter().find(|mode| mode.shape.is_none()) {
             return Err(other.section.fail(
                 "residue",
-                "other modes have shape_at_load and shape_at_gage; give all modes in the same way, as residues are parts of \
-                 the response at rest and shapes have a scale of their own",
+                "other modes have shape_at_load and shape_at_gage; give all modes in the same way, as residues are \
+                 fractions of the static response and shapes have their own scale",
             ));
         }
         by_shapes(&mut read)?;
@@ -80,8 +80,8 @@ fn by_shapes(read: &mut [ReadMode]) -> Result<(), Failure> {
     if residues == 0.0 || !residues.is_finite() {
         return Err(read[0].section.fail(
             "shape_at_load",
-            "with these shapes a torque at rest does not reach the gage (the sum of shape_at_load × shape_at_gage over the \
-             square of the frequency is zero)",
+            "with these shapes a static torque does not reach the gage (the sum of shape_at_load × shape_at_gage over \
+             the square of the frequency is zero)",
         ));
     }
     for (mode, part) in read.iter_mut().zip(parts) {
@@ -167,9 +167,9 @@ impl<'a> ReadMode<'a> {
 }
 
 /// Message for a mode with frequency and damping only.
-const NO_RESIDUE: &str = "residue is missing: the part that this mode has in the response at rest, as in residue = 0.9; a decay does \
-                          not tell it: measure it by identify response with a known torque or force, or give shape_at_load and \
-                          shape_at_gage of all modes";
+const NO_RESIDUE: &str = "residue is missing: the fraction of this mode in the static response, as in residue = 0.9; a \
+    decay does not give it: determine it by identify response with a known torque or force, or give shape_at_load and \
+    shape_at_gage of all modes";
 
 impl DeclaredMode {
     /// The mode and the index within it of a number, from its index among the numbers of all modes.

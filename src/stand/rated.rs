@@ -15,8 +15,9 @@ pub fn off_rated(largest: f64, rated: Option<f64>, unit: &str) -> Option<Warning
         return Some(Warning::new(
             "below-rated-torque",
             format!(
-                "the torque stays within {} {unit}, {} % of the rated torque of {} {unit} of the transducer, as with a record that \
-                 was not amplified by the stand's gain, or in another unit: check unit and gain of the channel",
+                "the torque stays within {} {unit}, {} % of the transducer's rated torque of {} {unit}, as if the \
+                 record were not amplified by the stand's gain, or in another unit: check unit and gain of the \
+                 channel",
                 rounded(largest, 3),
                 rounded(100.0 * largest / rated, 2),
                 short(rated)
@@ -29,8 +30,8 @@ pub fn off_rated(largest: f64, rated: Option<f64>, unit: &str) -> Option<Warning
     Some(Warning::new(
         "beyond-rated-torque",
         format!(
-            "the torque reaches {} {unit}, {} times the rated torque of {} {unit} of the transducer: check unit, gain and zero of \
-             the channel",
+            "the torque reaches {} {unit}, {} times the transducer's rated torque of {} {unit}: check unit, gain and \
+             zero of the channel",
             short(largest),
             rounded(largest / rated, 3),
             short(rated)

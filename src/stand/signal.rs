@@ -59,11 +59,13 @@ impl TransducerSignal {
         match self {
             Self::Strain => Some((
                 0.1,
-                "a strain of more than 10 %, which no gage survives: check the unit of the channel (microstrain is --unit ustrain)",
+                "a strain of more than 10 %, beyond any gage: check the unit of the channel (microstrain is --unit \
+                 ustrain)",
             )),
             Self::Ratio => Some((
                 1.0,
-                "more than the supply of the bridge, which no bridge gives: check the unit of the channel (mV/V, not V/V)",
+                "more than the supply of the bridge, which is impossible: check the unit of the channel (mV/V, not \
+                 V/V)",
             )),
             _ => None,
         }
@@ -120,8 +122,9 @@ impl TransducerSignal {
             let [at_rated, right, change] =
                 [change + zero, change - zero, change].map(|v| rounded(v / factor, 6));
             format!(
-                "at rated torque the output would be {at_rated} {unit}, which none of {name} reaches; the sensitivity is the change \
-                 from no load to rated torque: write \"{right} {unit}\" if {change} {unit} is the output at rated torque"
+                "at rated torque the output would be {at_rated} {unit}, beyond the range of {name}; the sensitivity is \
+                 the change from no load to rated torque: write \"{right} {unit}\" if {change} {unit} is the output at \
+                 rated torque"
             )
         })
     }
@@ -182,7 +185,7 @@ fn unknown(text: &str, unit: &Unit) -> String {
              \"% strain\")"
         ),
         None => format!(
-            "\"{text}\" is no output of a transducer; expected V, mV/V, mA, Hz, ustrain or N, as in \"2.0012 mV/V\""
+            "\"{text}\" is not a transducer output; expected V, mV/V, mA, Hz, ustrain or N, as in \"2.0012 mV/V\""
         ),
     }
 }

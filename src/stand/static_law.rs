@@ -61,8 +61,8 @@ impl Stand {
             law.warnings.push(Warning::new(
                 "calibration-not-used",
                 format!(
-                    "the channel \"{channel}\" is in {}, and [calibration] of {} is in {}: the record was taken through the \
-                     beam's drawing; record in {} to use the calibration",
+                    "the channel \"{channel}\" is in {}, and [calibration] of {} is in {}: the record was converted \
+                     with the beam's dimensions; record in {} to use the calibration",
                     named.text,
                     self.file,
                     measured.signal.usual_unit().0,
@@ -258,7 +258,7 @@ impl Stand {
     ) -> Result<StaticLaw, Failure> {
         let per_bridge_volt = match signal {
             TransducerSignal::Strain => {
-                let described = "strain through the beam's drawing".to_owned();
+                let described = "strain through the beam's dimensions".to_owned();
                 return self.of_slope(signal, self.torque_per_strain()?, zero, described);
             }
             TransducerSignal::Force => {
@@ -331,8 +331,8 @@ impl Stand {
             Some(beam) => Ok(beam.radius.value()),
             None => Err(Failure::failed(
                 ErrorCode::IncompleteStand,
-                "at which radius the recorded force acts is not given; add [calibration] lever_arm = \"0.5 m\", or, \
-                 to compensate the force itself, give [mechanics] as natural_frequency and damping_ratio with \
+                "the radius at which the recorded force acts is not given; add [calibration] lever_arm = \"0.5 m\", \
+                 or, to compensate the force itself, give [mechanics] as natural_frequency and damping_ratio with \
                  static_gain = \"1 N/N\"",
             )
             .at(&self.file)),

@@ -214,7 +214,7 @@ fn make_room(name: &str, document: &mut DocumentMut, entries: &[Entry]) -> Resul
     if gain.is_some() {
         return Err(Failure::failed(
             ErrorCode::InvalidStand,
-            "[mechanics] has static_gain, which converts the record already; remove it, or write to another file",
+            "[mechanics] has static_gain, which already converts the record; remove it, or write to another file",
         )
         .at(name));
     }

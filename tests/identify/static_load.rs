@@ -208,7 +208,7 @@ fn a_zero_that_drifts_is_said() {
         let ran = folder.run(&args.split(' ').collect::<Vec<_>>());
         assert_eq!(
             ran.stderr
-                .contains("[zero-drifts]: without load the reading went from 0.00009"),
+                .contains("[zero-drifts]: the zero reading drifted from 0.00009"),
             is_said,
             "{}",
             ran.stderr

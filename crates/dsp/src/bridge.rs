@@ -81,8 +81,8 @@ pub enum BridgeError {
     },
     /// The iteration for the strain did not converge.
     #[error(
-        "strain for {got_v} V must settle within {steps} steps, got {strain} at the last; \
-         check the bridge's data for extreme values"
+        "strain for {got_v} V must converge within {steps} steps, got {strain} at the last; check the bridge's data \
+         for extreme values"
     )]
     NotConverged {
         /// Maximum number of steps.

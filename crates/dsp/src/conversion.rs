@@ -36,8 +36,7 @@ pub enum ConversionError {
     Bridge(#[from] BridgeError),
     /// Points or coefficients that do not define a curve.
     #[error(
-        "the calibration must have two points or more and rise or fall throughout; \
-         correct its points, or choose a lower degree"
+        "the calibration must have at least two points and be monotonic; correct its points, or choose a lower degree"
     )]
     NoCurve,
     /// A recorded value far beyond a calibration curve.
@@ -67,7 +66,7 @@ pub enum ConversionError {
         got: f64,
     },
     /// A sample of a slice failed.
-    #[error("sample {index} must convert like those before it, got: {source}")]
+    #[error("sample {index} cannot be converted, unlike those before it: {source}")]
     Sample {
         /// Index of the sample in the slice, from 0.
         index: usize,

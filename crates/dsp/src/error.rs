@@ -16,9 +16,8 @@ pub enum Error {
     },
     /// The sampling rate is too low for the requested band.
     #[error(
-        "the record's rate of {sample_rate_hz} Hz carries frequencies below {nyquist_hz} Hz, \
-         the band asked for ends at {band_hz} Hz: record faster, or ask for a band of at most \
-         {highest_band_hz} Hz"
+        "at a rate of {sample_rate_hz} Hz the record contains frequencies below {nyquist_hz} Hz, but the requested \
+         band ends at {band_hz} Hz: record at a higher rate, or request a band of at most {highest_band_hz} Hz"
     )]
     RateTooLow {
         /// Rate of the record.
@@ -41,9 +40,9 @@ pub enum Error {
     },
     /// The inverse filter would be too long.
     #[error(
-        "the inverse filter does not die out within {samples} samples ({seconds} s): the band of \
-         {band_hz} Hz is very narrow for a rate of {sample_rate_hz} Hz, or the inverse response \
-         rings or grows too steeply; try another band"
+        "the inverse filter does not decay within {samples} samples ({seconds} s): the band of {band_hz} Hz is very \
+         narrow for a rate of {sample_rate_hz} Hz, or the inverse response rings or grows too steeply; try another \
+         band"
     )]
     FilterTooLong {
         /// Longest length tried, in samples.
@@ -75,8 +74,8 @@ pub enum Error {
     },
     /// Two components that cannot be resolved within the length of the record.
     #[error(
-        "components {first_hz} Hz and {second_hz} Hz cannot be told apart in {seconds} s: \
-         record at least {needed_s} s, or ask for fewer orders"
+        "components {first_hz} Hz and {second_hz} Hz cannot be resolved in {seconds} s: record at least {needed_s} s, \
+         or request fewer orders"
     )]
     NotSeparable {
         /// Lower frequency.
@@ -90,8 +89,8 @@ pub enum Error {
     },
     /// A component at or above the Nyquist frequency.
     #[error(
-        "a component at {frequency_hz} Hz cannot be seen at a rate of {sample_rate_hz} Hz: \
-         ask for orders below {nyquist_hz} Hz"
+        "a component at {frequency_hz} Hz cannot be observed at a rate of {sample_rate_hz} Hz: request orders below \
+         {nyquist_hz} Hz"
     )]
     AboveNyquist {
         /// Frequency of the component.
@@ -103,8 +102,7 @@ pub enum Error {
     },
     /// No frequency near the given one fits the record.
     #[error(
-        "the fundamental could not be refined from {start_hz} Hz: {why}; give it more exactly, or \
-         leave it as it is"
+        "the fundamental could not be refined from {start_hz} Hz: {why}; give it more precisely, or do not refine it"
     )]
     NotRefined {
         /// Start frequency of the search.
@@ -120,8 +118,7 @@ pub enum Error {
     },
     /// A gap in the time stamps is too long to interpolate.
     #[error(
-        "a gap of {gap_s} s, {steps} steps long, ends at {time_s} s: more would be invented than \
-         measured; split the record there"
+        "a gap of {gap_s} s, {steps} steps long, ends at {time_s} s: too long to interpolate; split the record there"
     )]
     GapTooLong {
         /// Stamp after the gap.
@@ -132,9 +129,7 @@ pub enum Error {
         steps: f64,
     },
     /// Time stamps that are not increasing.
-    #[error(
-        "time stamp {index} ({time_s} s) does not lie after the one before it ({previous_s} s)"
-    )]
+    #[error("time stamp {index} ({time_s} s) is not later than the previous one ({previous_s} s)")]
     TimeNotIncreasing {
         /// Index of the later stamp.
         index: usize,

@@ -24,8 +24,8 @@ pub enum GageError {
     },
     /// The strain lies beyond the validity of the law.
     #[error(
-        "strain must keep the gage on the rising side of its parabola, short of {limit} \
-         at {temperature_k} K, got {got}; check the strain's unit (m/m, not microstrain)"
+        "strain must keep the gage on the rising side of its parabola, below {limit} at {temperature_k} K, got {got}; \
+         check the strain's unit (m/m, not microstrain)"
     )]
     StrainOutOfRange {
         /// Strain at the vertex of the parabola.

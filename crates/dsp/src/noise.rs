@@ -91,7 +91,7 @@ pub struct RecordNoise {
     pub compensated_rms: f64,
     /// Rms of the record within the band, without its mean, noise included.
     pub in_band_rms: f64,
-    /// Rms of what the record has above the band beside its noise, in the band's edge as far as it is removed:
+    /// Rms of the signal above the band without noise, in the band's edge as far as it is removed:
     /// `√(∫(S − S₀)(1 − W)² df)`.
     pub above_band_rms: f64,
     /// Ranges within the band where the record does not rise 3 dB above the floor, in Hz.

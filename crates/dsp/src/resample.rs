@@ -24,11 +24,11 @@ const COINCIDENT: f64 = 1e-6;
 /// What a resampling did.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 pub struct Resampled {
-    /// Samples taken in.
+    /// Input samples.
     pub samples_in: usize,
-    /// Samples given out.
+    /// Output samples.
     pub samples_out: usize,
-    /// Samples left out because their stamp repeats the one before.
+    /// Samples dropped because their stamp repeats the previous one.
     pub repeated: usize,
     /// Steps longer than 1.5 grid steps, bridged by a straight line.
     pub gaps: usize,

@@ -79,8 +79,8 @@ pub enum ModelError {
     },
     /// No bending moment at the position of the gage.
     #[error(
-        "a gage at {position_m} m sits at the loaded end of the beam, where the bending moment \
-         is 0, so no strain tells the torque; move it towards the clamp"
+        "a gage at {position_m} m is at the loaded end of the beam, where the bending moment is 0, so strain does not \
+         depend on torque; move it towards the clamp"
     )]
     NoMoment {
         /// The position in m from the clamp.

@@ -29,7 +29,7 @@ const MATTERS: f64 = 0.02;
 pub(super) struct BandReport {
     /// End of the part that is compensated in full.
     pub(super) top_hz: f64,
-    /// Frequency from which on nothing is passed.
+    /// Frequency above which nothing is passed.
     pub(super) end_hz: f64,
     pub(super) chosen_from: BandSource,
     /// Length of the part of the record that the band was chosen from, in s; `null` if it was not chosen.
@@ -130,12 +130,12 @@ impl BandReport {
             BandSource::Option => "as given".to_owned(),
             BandSource::Rated => "the rated band".to_owned(),
             BandSource::Stand => format!(
-                "chosen from the stand alone, up to a gain of 10, because the first {} s do not rise above their noise",
+                "chosen from the stand alone, up to a gain of 10, because the signal in the first {} s is below the \
+                 noise",
                 length(self.seconds)
             ),
             BandSource::HeldSamples => {
-                "a fifth of the rate at which new values come: each is held for several samples"
-                    .to_owned()
+                "a fifth of the rate of new values: each is held for several samples".to_owned()
             }
             BandSource::Record => {
                 "chosen for the least expected error from the record and its noise".to_owned()
@@ -162,8 +162,8 @@ impl BandReport {
         Some(Warning::new(
             "lines-decide-band",
             format!(
-                "the band reaches {} Hz only because of {which} at {} Hz: {} {unit} rms of the result. If that is picked up \
-                 (a converter that switches, say) and no torque, give --band {}",
+                "the band extends to {} Hz only because of {which} at {} Hz: {} {unit} rms of the result. If that is \
+                 interference (from a switching converter, say) and not torque, give --band {}",
                 short(self.top_hz),
                 rounded(lines.frequency_hz, 4),
                 rounded(of_lines, 3),

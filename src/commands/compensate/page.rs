@@ -81,7 +81,7 @@ impl PageData {
         self.spectra(&mut page, report);
         self.gain(&mut page, report);
         filled(&mut page, report);
-        page.heading("How it was done");
+        page.heading("Method");
         page.facts(&report.facts());
         page.html()
     }

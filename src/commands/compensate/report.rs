@@ -41,13 +41,13 @@ pub(in crate::commands) struct CompensateReport {
     pub(super) output_signal: Option<String>,
     /// Unit of the result: of `result`, `noise.record`, `rated_torque`, `zero_std`, `result_std` and `lines`.
     pub(super) unit: String,
-    /// How the record became torque at rest.
+    /// How the record was converted to static torque.
     pub(super) calibration: String,
     /// Relative standard uncertainty of the constant of the calibration; `null` if unknown, or if there is none.
     pub(super) calibration_relative_std: Option<f64>,
-    /// Standard uncertainty that the given record at no load brings to every value, in `unit`; `null` if it has none.
+    /// Standard uncertainty of every value from the given zero, in `unit`; `null` if it has none.
     pub(super) zero_std: Option<f64>,
-    /// Torque that the transducer is made for, in `unit`; `null` if the stand file does not give it.
+    /// Rated torque of the transducer, in `unit`; `null` if not in the stand file.
     pub(super) rated_torque: Option<f64>,
     #[serde(skip)]
     pub(super) levels: RecordedLevels,
@@ -56,8 +56,8 @@ pub(in crate::commands) struct CompensateReport {
     pub(super) modes: Vec<(f64, f64)>,
     /// Number of samples.
     pub(super) samples: usize,
-    /// Number of samples, from the first on, in which hum, held samples, coarse resolution and clipping under noise were looked for; clipping
-    /// and drop-outs are looked for in all.
+    /// Number of samples, from the first on, checked for hum, held samples, coarse resolution and clipping under noise;
+    /// all samples are checked for clipping and drop-outs.
     pub(super) looked_at: usize,
     /// Sampling rate, in Hz.
     pub(super) rate_hz: f64,
@@ -74,20 +74,20 @@ pub(in crate::commands) struct CompensateReport {
     pub(super) reach_s: f64,
     /// `stream`, `whole-record`, or `refined` for a stand with effects that no filter describes.
     pub(super) method: &'static str,
-    /// Effects of the stand that were taken out, the last link of the chain first.
+    /// Effects of the stand that were removed, the last link of the chain first.
     pub(super) effects: Vec<UndoneEffect>,
     /// Highest frequency of the record at which nonlinear curves and torques of the stand were evaluated, in Hz; `null`
     /// if there are none.
     pub(super) seen_to_hz: Option<f64>,
     /// Times at which the torque cannot be recovered from the record.
     pub(super) lost: Vec<LostSpan>,
-    /// Lines that were taken off, in `unit` as a record at rest has it.
+    /// Lines removed, in `unit` after static conversion.
     pub(super) lines: Vec<RemovedLine>,
     /// The band, and where it comes from.
     pub(super) band: BandReport,
     /// End of the part of the spectrum that is compensated in full, in Hz.
     pub(super) band_hz: f64,
-    /// Frequency from which on nothing is passed, in Hz.
+    /// Frequency above which nothing is passed, in Hz.
     pub(super) band_end_hz: f64,
     /// Time from either end within which the result depends on extrapolation beyond the record, in s.
     pub(super) edge_s: f64,
@@ -97,7 +97,7 @@ pub(in crate::commands) struct CompensateReport {
     pub(super) result_std: Option<ResultStd>,
     /// What `--resample` did; `null` without it.
     pub(super) resampled: Option<Resampled>,
-    /// What the compensation does to noise.
+    /// Effect of the compensation on noise.
     pub(super) noise: NoiseReport,
     /// Warnings, each with a stable code.
     pub(super) warnings: Vec<Warning>,
@@ -120,7 +120,7 @@ pub(super) struct UndoneEffect {
     /// Form of the effect in the stand file.
     pub(super) form: &'static str,
     /// `divided out`, `inverted`, `subtracted`, `integrated` (with memory, along the motion), or `marked` where it
-    /// cannot be taken out.
+    /// cannot be removed.
     pub(super) done: &'static str,
 }
 
@@ -135,7 +135,7 @@ pub(super) struct RemovedLine {
     pub(super) recorded: f64,
     /// Phase of the line's sine at the first sample, in rad.
     pub(super) phase_rad: f64,
-    /// Part of the amplitude that was taken off: less than 1 where the signal hides the phase.
+    /// Fraction of the amplitude removed: less than 1 where the signal masks the phase.
     pub(super) share: f64,
 }
 
@@ -257,7 +257,8 @@ impl CompensateReport {
         ]);
         if self.looked_at < self.samples {
             let looked_at = format!(
-                "clipping and drop-outs were looked for throughout, hum and held values in the first {} samples; inspect looks at more",
+                "clipping and drop-outs were checked throughout, hum and held values in the first {} samples; inspect \
+                 checks more",
                 self.looked_at
             );
             facts.push(fact("quality", looked_at));
@@ -411,7 +412,7 @@ impl CompensateReport {
         if !found.left_out.is_empty() {
             let _ = write!(
                 text,
-                "; {} cannot be moved by the std given",
+                "; {} cannot be varied by the given std",
                 found.left_out.join(", ")
             );
         }
@@ -434,8 +435,8 @@ impl CompensateReport {
 
 fn resampled_text(resampled: &Resampled) -> String {
     format!(
-        "{} samples interpolated to {}; {} filled by straight lines ({} samples, longest step \
-         {} s), {} dropped, jitter up to {} % of a step",
+        "{} samples interpolated to {}; {} filled by linear interpolation ({} samples, longest step {} s), {} dropped, \
+         jitter up to {} % of a step",
         resampled.samples_in,
         resampled.samples_out,
         plural(resampled.gaps, "gap"),

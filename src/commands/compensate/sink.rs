@@ -186,14 +186,14 @@ fn origin(args: &Compensate, plan: &Plan) -> Result<MessageOrigin, Failure> {
     let Some(origin) = &plan.stream.origin else {
         return Err(Failure::usage(
             ErrorCode::ConflictingArguments,
-            "an MCAP result is a copy of an MCAP input with one channel more: the input must be MCAP, and its samples as they \
-             are, without --range, --fill or --resample; use --format csv",
+            "an MCAP result is a copy of an MCAP input with an additional channel: the input must be MCAP and its \
+             samples unchanged, without --range, --fill or --resample; use --format csv",
         ));
     };
     if args.record.input() == "-" {
         return Err(Failure::usage(
             ErrorCode::ConflictingArguments,
-            "an MCAP result needs its input twice, and standard input can be read once only; name the file",
+            "an MCAP result reads its input twice, but standard input can be read only once; name the file",
         ));
     }
     if args.with_recorded {
@@ -206,7 +206,7 @@ fn origin(args: &Compensate, plan: &Plan) -> Result<MessageOrigin, Failure> {
         return Err(Failure::failed(
             ErrorCode::UnitUnsuitable,
             format_args!(
-                "an MCAP result holds torque in N m, but this record becomes a {} in {}; use --format csv",
+                "an MCAP result contains torque in N m, but this record becomes a {} in {}; use --format csv",
                 plan.chain.applied.name, plan.chain.applied.unit
             ),
         ));

@@ -66,9 +66,9 @@ pub(super) fn of_ringing(stand: &Stand, rate_hz: f64) -> Option<Warning> {
         Warning::new(
             "resonance-above-nyquist",
             format!(
-                "the stand resonates at {} Hz, above half the sampling rate of {} Hz: steps and shocks make it ring, and the \
-                 ringing folds into the record, where nothing can take it out; record at {} Hz or more, or behind a \
-                 low-pass (say so with [recorder] low_pass)",
+                "the stand resonates at {} Hz, above half the sampling rate of {} Hz: after steps and shocks its \
+                 ringing aliases into the record and cannot be removed; record at {} Hz or more, or through a low-pass \
+                 (declared as [recorder] low_pass)",
                 rounded(resonance_hz, 4),
                 short(rate_hz),
                 rounded(5.0 * resonance_hz, 2)
@@ -83,8 +83,9 @@ pub(super) fn of_ends(undo: Option<&ChainInverse>, edge_s: f64) -> Option<Warnin
     Some(Warning::new(
         "ends-felt-far",
         format!(
-            "dividing out \"{effect}\" has no end in time: what was before the record and behind it is felt beyond the first and last \
-             {} s, less only in proportion to the distance; leave out more at both ends, or record from rest to rest",
+            "the inverse of \"{effect}\" is infinitely long: what happened before and after the record affects more \
+             than the first and last {} s, and decreases only in proportion to the distance; discard more at both \
+             ends, or record from rest to rest",
             rounded(edge_s, 3)
         ),
     ))
@@ -105,9 +106,9 @@ fn of_resonance(report: &CompensateReport, seen: &Seen) -> Option<Warning> {
     Some(Warning::new(
         "resonance-elsewhere",
         format!(
-            "the record has a resonance at {} Hz (damping ratio about {}) and none at {} Hz, where the stand file says that the \
-             stand resonates: if it is the stand's, the result is wrong. Record a tap on the stand as it is and \
-             find its constants with identify decay; if the machine resonates there, nothing need be done",
+            "the record has a resonance at {} Hz (damping ratio about {}) and none at {} Hz, the natural frequency in \
+             the stand file: if it is the stand's, the result is wrong. Record a tap on the stand as it is and \
+             determine its constants with identify decay; if it is the machine's, ignore this",
             rounded(found.frequency_hz, 3),
             rounded(found.damping_ratio, 1),
             rounded(report.modes[0].0, 4)
@@ -121,8 +122,8 @@ fn of_unknown_noise(report: &CompensateReport) -> Option<Warning> {
         Warning::new(
             "noise-unknown",
             format!(
-                "the record is amplified up to {} times and its noise is unknown; choose a lower --band if the result looks \
-                 noisy",
+                "the record is amplified up to {} times, and its noise is unknown; choose a lower --band if the result \
+                 looks noisy",
                 rounded(gain, 3)
             ),
         )
@@ -149,7 +150,7 @@ fn empty_plot(report: &CompensateReport) -> Warning {
     Warning::new(
         "empty-plot",
         format!(
-            "no sample lies within --plot-range; the record runs from {} to {}",
+            "--plot-range contains no samples; the record runs from {} to {}",
             report.start.text(),
             end.text()
         ),
@@ -180,9 +181,9 @@ fn of_amplification(noise: &RecordNoise, report: &CompensateReport) -> Option<Wa
         Warning::new(
             "mostly-amplified",
             format!(
-                "the result is {} times as large as the record, {} instead of {} {unit} rms: nearly all of it is what \
-                 the record holds far above the resonance, multiplied by up to {}. Check the mechanics of the stand, the \
-                 sampling rate of {} Hz, and --band",
+                "the result is {} times the record, {} instead of {} {unit} rms: nearly all of it comes from far above \
+                 the resonance, amplified up to {} times. Check the mechanics of the stand, the sampling rate of {} \
+                 Hz, and --band",
                 rounded(rms / noise.in_band_rms, 3),
                 rounded(rms, 3),
                 rounded(noise.in_band_rms, 3),
@@ -249,8 +250,7 @@ fn of_gaps(resampled: &Resampled) -> Option<Warning> {
         Warning::new(
             "resampled-gaps",
             format!(
-                "{} in the time stamps filled by straight lines ({} samples, the longest step {} s), {} \
-                 dropped",
+                "{} in the time stamps filled by linear interpolation ({} samples, longest step {} s), {} dropped",
                 plural(resampled.gaps, "gap"),
                 resampled.bridged,
                 rounded(resampled.longest_step_s, 4),

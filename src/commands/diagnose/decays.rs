@@ -65,8 +65,8 @@ pub fn check_arguments(args: &Diagnose) -> Result<(), Failure> {
     if args.training_files().is_empty() {
         return Err(Failure::usage(
             ErrorCode::MissingArgument,
-            "--holdout-decay only checks what was fitted, and no record to fit is given: add one of free ringing with --decay \
-             FILE, or one with an applied quantity with --train FILE and --applied COL",
+            "--holdout-decay only checks a fit, and no record to fit is given: add a free decay with --decay FILE, or \
+             a record with an applied quantity with --train FILE and --applied COL",
         ));
     }
     let of_applied = [
@@ -79,8 +79,8 @@ pub fn check_arguments(args: &Diagnose) -> Result<(), Failure> {
             Err(Failure::usage(
                 ErrorCode::ConflictingArguments,
                 format_args!(
-                    "{flag} does not apply to --decay, as nothing acts on a stand that rings freely: omit {flag}, or give records with \
-                 an applied quantity with --train or --static"
+                    "{flag} does not apply to --decay, as nothing acts on a stand during a free decay: omit {flag}, or \
+                     give records with an applied quantity with --train or --static"
                 ),
             ))
         }
@@ -93,8 +93,8 @@ pub fn last(train: &mut Vec<Pair>) -> Result<Option<Pair>, Failure> {
     if let [only] = train.as_slice() {
         return Err(Failure::failed(
             ErrorCode::TooFewSamples,
-            "one decay is fitted, and none is left to check the result: record another one, better of another size, and give \
-             it with --holdout-decay",
+            "the only decay is fitted, and none is left to check the result: record another one, preferably of another \
+             size, and give it with --holdout-decay",
         )
         .at(&only.source));
     }
@@ -105,8 +105,8 @@ pub fn last(train: &mut Vec<Pair>) -> Result<Option<Pair>, Failure> {
 pub fn no_gain() -> Failure {
     Failure::usage(
         ErrorCode::MissingArgument,
-        "free ringing does not show the gain, without which a stand file cannot say what an effect in the unit of the record is as a \
-         torque: give known loads with --static FILE and --applied COL, or --stand FILE with a static_gain or a [calibration], or leave \
-         -o out",
+        "a free decay does not determine the gain, without which a stand file cannot express an effect in the unit of \
+         the record as a torque: give known loads with --static FILE and --applied COL, or --stand FILE with a \
+         static_gain or a [calibration], or omit -o",
     )
 }

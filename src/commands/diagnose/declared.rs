@@ -46,19 +46,18 @@ pub(super) fn torques_unknown(
         (Motion::Displacement, Some(several)) if several.show_torques() => match rings {
             false => return None,
             true => (
-                "the motion that free ringing begins with is known of all modes together only"
-                    .to_owned(),
+                "the initial motion of a decay is known only for all modes together".to_owned(),
                 "give records with an applied torque, without decays",
             ),
         },
         (Motion::Displacement, Some(_)) => (
-            "how far they move each mode there does not follow from residues of both signs"
+            "how far they move each mode at the gage does not follow from residues of both signs"
                 .to_owned(),
-            "give shape_at_load and shape_at_gage of [[modes]] in place of residue",
+            "give shape_at_load and shape_at_gage of [[modes]] instead of residue",
         ),
         (measures, _) => (
             format!(
-                "the record is of the {}, they go with the displacement",
+                "the record is of the {}, but they depend on the displacement",
                 measures.name()
             ),
             "record the displacement, strain or torque",
@@ -67,7 +66,7 @@ pub(super) fn torques_unknown(
     Some(Warning::new(
         "no-torques-tried",
         format!(
-            "friction, play, springs that bend and other torques in the stand were not looked for: {why}; {remedy}"
+            "friction, play, nonlinear springs and other torques in the stand were not tried: {why}; {remedy}"
         ),
     ))
 }

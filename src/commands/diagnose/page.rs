@@ -371,7 +371,7 @@ impl Draft<'_> {
             return;
         };
         self.page
-            .heading("The torque that is missing, of no given law");
+            .heading("The missing torque, without an assumed law");
         let shares = &surface.shares;
         let mut rows = vec![cells(["it follows from", "share"])];
         rows.extend(
@@ -379,7 +379,7 @@ impl Draft<'_> {
                 ("the displacement", shares.displacement),
                 ("the speed", shares.speed),
                 ("both together", shares.both),
-                ("the way that led there", shares.history),
+                ("the path to it", shares.history),
             ]
             .map(|(of, share)| cells([of, &format!("{} %", rounded(100.0 * share, 2))])),
         );

@@ -228,8 +228,8 @@ pub(super) fn two_columns(args: &Diagnose, without: &str) -> Result<[ChannelChoi
 fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
     let choices = two_columns(
         args,
-        "--train and --holdout need --applied COL, the channel with the applied quantity; records of free ringing without one are \
-         given with --decay and --holdout-decay",
+        "--train and --holdout need --applied COL, the channel with the applied quantity; give free decays, which have \
+         none, with --decay and --holdout-decay",
     )?;
     let read = AlignedChannels::read(&Input::of(file), &choices, &args.reading)?;
     let mut channels = read.channels.into_iter();

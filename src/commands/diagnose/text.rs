@@ -24,7 +24,7 @@ impl Report for Diagnosis {
         };
         let declared = match self.declared_effects.as_slice() {
             [] => String::new(),
-            some => format!("declared effects, fitted anew: {}\n", some.join(", ")),
+            some => format!("declared effects, refitted: {}\n", some.join(", ")),
         };
         let mut text = format!(
             "verdict: {}\neffects: {effects}\n{declared}{}\n\n{}{}\n{}\n{}{}\n",
@@ -72,13 +72,13 @@ pub fn answer(diagnosis: &Diagnosis) -> Vec<String> {
     };
     let verdict = match diagnosis.verdict {
         Verdict::Explained => {
-            format!("Explained: with {names}, the error on the held-out records is at the noise.")
+            format!("Explained: with {names}, the hold-out error is at the noise level.")
         }
         Verdict::PartlyExplained => format!(
-            "Partly explained: {names} {reduce} the error on the held-out records, but structure above the noise remains."
+            "Partly explained: {names} {reduce} the hold-out error, but structure above the noise remains."
         ),
         Verdict::NothingMissing => {
-            "Nothing missing: the plain stand explains the held-out records down to the noise."
+            "Nothing missing: the plain stand explains the hold-out records down to the noise."
                 .to_owned()
         }
         Verdict::Unexplained => {
@@ -119,8 +119,8 @@ fn of_change(change: &ChangedStand) -> String {
         })
         .collect();
     format!(
-        "The stand changed {} s after the first sample of {}: {}. With one stand before that moment and another after it, {} {} of \
-         that record are left, in place of {} with one stand throughout.",
+        "The stand changed {} s after the first sample of {}: {}. With separate stands before and after it the \
+         residual of that record is {} {}, instead of {} with one stand throughout.",
         rounded(change.time_s, 5),
         change.record,
         enumeration(&constants, "and"),
@@ -134,7 +134,7 @@ fn of_change(change: &ChangedStand) -> String {
 fn of_surface(surface: &ForceSurface, unit: &str) -> Vec<String> {
     let place = match surface.place {
         SurfacePlace::Stand => "a torque in the stand",
-        SurfacePlace::GagePath => "a torque in the part that the gage sits on",
+        SurfacePlace::GagePath => "a torque in the part that carries the gage",
         SurfacePlace::Gage => "a change in the gage or its amplifier",
     };
     let named = match surface.outdoes_laws {
@@ -143,15 +143,12 @@ fn of_surface(surface: &ForceSurface, unit: &str) -> Vec<String> {
     };
     let nearest = match surface.nearest.as_slice() {
         [] => String::new(),
-        some => format!(
-            " What comes nearest, as hypotheses: {}.",
-            enumeration(some, "and")
-        ),
+        some => format!(" Closest, as hypotheses: {}.", enumeration(some, "and")),
     };
     vec![
         format!(
-            "Without an assumed law: {place} over displacement and speed, accepted effects included, leaves {} {} of the \
-             held-out records, by the motion that was measured there.{named}",
+            "Without an assumed law: {place} over displacement and speed, accepted effects included, leaves {} {} of \
+             the hold-out records, given the motion measured there.{named}",
             rounded(surface.holdout_rms, 4),
             unit_or_as_recorded(unit)
         ),
@@ -206,7 +203,7 @@ fn several(diagnosis: &Diagnosis) -> String {
     for pair in &diagnosis.explained.correlations {
         let [one, other] = pair.effects;
         text += &format!(
-            "Correlation of what {one} and {other} explain alone: {}.\n",
+            "Correlation of the separate contributions of {one} and {other}: {}.\n",
             rounded(pair.correlation, 2)
         );
     }
@@ -298,12 +295,12 @@ pub fn error_sentences(diagnosis: &Diagnosis) -> Vec<String> {
     };
     let course = match diagnosis.input_between_samples {
         "held" => Some("each sample were held until the next one, as a converter does"),
-        "straight-lines" => Some("straight lines connected its samples"),
+        "straight-lines" => Some("its samples were joined by straight lines"),
         _ => None,
     };
     let course = course.map(|course| {
         format!(
-            "The applied quantity behaves as if {course}; all errors are for that: run \"simulate\" with --between {}.",
+            "The applied quantity behaves as if {course}; all errors assume this: run \"simulate\" with --between {}.",
             diagnosis.input_between_samples
         )
     });
@@ -341,11 +338,11 @@ pub fn load_sentences(diagnosis: &Diagnosis) -> Vec<String> {
 
 /// What the detection limits are.
 pub const WOULD_SHOW: &str =
-    "Smallest amounts that the training records would have shown with 95 % certainty";
+    "Smallest amounts detectable in the training records with 95 % certainty";
 
 /// The detection limits, with a head.
 pub fn limit_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
-    let mut rows = vec![cells(["effect", "from there on", "at"])];
+    let mut rows = vec![cells(["effect", "detectable from", "at"])];
     rows.extend(diagnosis.detection_limits.iter().map(|limit| {
         let side = match limit.shows {
             ShownSide::From => ">=",
@@ -358,7 +355,7 @@ pub fn limit_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
                 rounded(value, 3),
                 limit.unit
             ),
-            None => "no physical amount".to_owned(),
+            None => "no physically possible amount".to_owned(),
         };
         let at = limit.at.iter().map(|p| {
             let value = rounded(p.estimate.value(), 3);

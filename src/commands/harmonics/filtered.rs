@@ -43,7 +43,7 @@ pub(super) fn warning(
         Warning::new(
             "orders-beyond-band",
             format!(
-                "above about {} Hz the record was filtered: part or all is gone of {}; compensate again with \
+                "the record was filtered above about {} Hz, which removes part or all of {}; compensate again with \
                  --band {} or more, or give harmonics the recorded channel and --stand",
                 rounded(top_hz, 2),
                 super::named(&names),

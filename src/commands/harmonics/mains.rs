@@ -18,8 +18,8 @@ pub(super) fn warning(components: &[ComponentTorque], duration_s: f64) -> Option
         return Some(Warning::new(
             "order-or-mains",
             format!(
-                "the fundamental is that of {grid_hz} Hz mains, and so all orders may contain what a cable picks up: record once with the \
-                 motor off and the supply on, and subtract what is there"
+                "the fundamental is that of {grid_hz} Hz mains, so any order may contain mains pickup: record once \
+                 with the motor off and the supply on, and subtract its lines"
             ),
         ));
     }
@@ -39,8 +39,8 @@ pub(super) fn warning(components: &[ComponentTorque], duration_s: f64) -> Option
         Warning::new(
             "order-or-mains",
             format!(
-                "mains lines coincide with {} and cannot be separated at one speed: record at another speed, where orders \
-                 move and mains lines stay",
+                "mains lines coincide with {} and cannot be separated at a single speed: record at another speed, \
+                 which moves the orders but not the mains lines",
                 named(&doubtful)
             ),
         )

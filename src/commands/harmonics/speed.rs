@@ -83,8 +83,8 @@ pub(super) fn off(
         Warning::new(
             "fundamental-off",
             format!(
-                "the record fits a fundamental of {digits} Hz better than {} Hz, at which components come out too \
-                 small and with wrong phases: add {refine}, or give --fundamental {digits}",
+                "a fundamental of {digits} Hz fits the record better than {} Hz, at which components are too small and \
+                 their phases wrong: add {refine}, or give --fundamental {digits}",
                 rounded(fundamental_hz, 7)
             ),
         )
@@ -136,8 +136,8 @@ pub(super) fn warning(
         Warning::new(
             "speed-changes",
             format!(
-                "the fundamental changes over the record, from {} to {} Hz: the components are averages that come \
-                 out too small, the more the higher their order; take a part of constant speed with --range",
+                "the fundamental changes over the record, from {} to {} Hz: the components are averages and too small, \
+                 increasingly with their order; select a part of constant speed with --range",
                 rounded(slowest.frequency_hz, 6),
                 rounded(fastest.frequency_hz, 6)
             ),
@@ -197,8 +197,8 @@ pub(super) fn sways(
         Warning::new(
             "speed-changes",
             format!(
-                "the speed is not steady: the angle of the shaft sways by {} degrees (rms) about an even rotation, so that \
-                 components are averages that come out too small, order {} by about {} %; take a shorter part with --range",
+                "the speed is not constant: the shaft angle deviates by {} degrees rms from uniform rotation, so \
+                 components are averages and too small, order {} by about {} %; select a shorter part with --range",
                 rounded(sways_rad.to_degrees(), 2),
                 rounded(highest, 4),
                 rounded(100.0 * loss, 2)
@@ -279,8 +279,8 @@ pub(super) fn load_changes(
         Warning::new(
             "load-changes",
             format!(
-                "the mean torque changes over the record by {} % of its largest value, most about {} s after its start: the components \
-                 are averages over different loads; take a part of constant load with --range",
+                "the mean torque changes over the record by {} % of its largest value, most at about {} s after the \
+                 start: the components are averages over different loads; select a part of constant load with --range",
                 rounded(100.0 * change / largest, 2),
                 rounded(at, 2)
             ),

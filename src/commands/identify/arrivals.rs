@@ -56,16 +56,16 @@ pub(super) fn warning(at_stamps: &Result<Identification, Failure>, rate_hz: f64)
     let left = at_stamps.as_ref().ok().and_then(|found| found.fit.as_ref());
     let left = match left {
         Some(fit) => format!(
-            "{} % of the swing is left at them",
+            "with them the residual is {} % of the decay",
             rounded(100.0 * fit.relative, 3)
         ),
-        None => "nothing rings at them".to_owned(),
+        None => "no decay is found with them".to_owned(),
     };
     Warning::new(
         "stamps-of-arrival",
         format!(
-            "the time stamps jitter: {left}, and clearly less at even steps of {} Hz. They say when samples arrived, and even steps \
-             were taken; give the recorder's rate with --rate HZ",
+            "the time stamps jitter: {left}, and equal steps of {} Hz fit clearly better. They are arrival times, so \
+             equal steps were used; give the recorder's rate with --rate HZ",
             rounded(rate_hz, 7)
         ),
     )

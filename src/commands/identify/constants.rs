@@ -93,9 +93,9 @@ pub(super) fn from_ratios(
 }
 
 /// Said where no constant is known that the ratios could be scaled with.
-const ONLY_RATIOS: &str = "natural frequency and damping ratio, which compensate needs, are found; for inertia, damping and \
-                           stiffness, of which this test gives only ratios, give --inertia or --stiffness, or a stand \
-                           file that declares one";
+const ONLY_RATIOS: &str = "natural frequency and damping ratio, which compensate needs, are determined, but only \
+    ratios of inertia, damping and stiffness; for the constants themselves, give --inertia or --stiffness, or a stand \
+    file that declares one";
 
 /// The known constant, and whether it comes from the command line.
 fn known(
@@ -161,8 +161,7 @@ pub(super) fn from_residue(
     if anchors.inertia.is_some() || anchors.stiffness.is_some() {
         result.warn(
             "anchor-not-needed",
-            "--inertia or --stiffness is not used: a torque and the motion it causes determine inertia, damping and \
-             stiffness",
+            "--inertia or --stiffness is not used: torque and motion determine inertia, damping and stiffness",
         );
     }
     if let Some(angle) = mode.residue_phase() {
@@ -170,8 +169,8 @@ pub(super) fn from_residue(
             "turned",
             format!(
                 "the phase of the mode differs by {} degrees from J θ'' + f θ' + K θ = T, so its constants are \
-                 approximate: check for a delay (--delay), another mode close by, or a motion measured elsewhere than \
-                 the torque acts",
+                 approximate: check for a delay (--delay), another mode close by, or a motion not measured where the \
+                 torque acts",
                 rounded(angle.to_degrees(), 2)
             ),
         );

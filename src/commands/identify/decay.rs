@@ -273,6 +273,6 @@ fn modes(result: &mut Identification, source: &str) -> Entry {
 }
 
 /// Said of several modes of a decay.
-const NO_RESIDUES: &str = "a decay tells frequency and damping of each mode, but not what part it has in the response to a torque; \
-                           residues that the stand file has for as many modes stay; else add residue to each of [[modes]], or \
-                           use identify response with a known torque or force";
+const NO_RESIDUES: &str = "a decay gives frequency and damping of each mode, but not its residue in the response to a \
+    torque; residues in the stand file are kept if the number of modes is the same; otherwise add residue to each of \
+    [[modes]], or use identify response with a known torque or force";

@@ -109,8 +109,8 @@ fn options(args: &Response, motion: Motion) -> ResponseOptions {
 }
 
 /// Said where no mode moves at rest.
-const NOT_AT_REST: &str = "the response at rest of these modes is zero, which a stand file measures all of them by; choose another \
-                           --band";
+const NOT_AT_REST: &str = "the static response of these modes is zero, but a stand file scales residues by it; choose \
+    another --band";
 
 /// Makes a torque of a force that acts at a radius.
 fn to_torque(force: &mut AlignedChannel, radius: &str) -> Result<(), Failure> {

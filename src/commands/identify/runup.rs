@@ -92,7 +92,7 @@ fn entries(args: &Runup, result: &Identification) -> Result<Vec<Entry>, Failure>
         Some(inertia) => Ok(vec![entry("mechanics", "inertia", inertia, &source)]),
         None if is_written => Err(Failure::failed(
             ErrorCode::ConflictingArguments,
-            "a stand file has no place for a mass; omit -o, or record an angle and a torque",
+            "a stand file cannot store a mass; omit -o, or record an angle and a torque",
         )),
         None => Ok(Vec::new()),
     }
@@ -121,8 +121,8 @@ fn effort_factor(args: &Runup, torque: &AlignedChannel, turning: bool) -> Result
         (false, TORQUE, _) => Err(Failure::failed(
             ErrorCode::UnitUnsuitable,
             format_args!(
-                "channel \"{}\" is a torque, but \"{}\" moves along a line: name the force there, or the motion as an angle; \
-                 where a drive of known ratio lies between, give --torque-factor, such as \"50 N/(N m)\"",
+                "channel \"{}\" is a torque, but \"{}\" is a linear motion: give the force instead, or the motion as \
+                 an angle; for a drive of known ratio in between, give --torque-factor, such as \"50 N/(N m)\"",
                 torque.name, args.motion
             ),
         )),
@@ -162,8 +162,8 @@ fn factor_of(text: &str, channel: RecordedChannel) -> Result<(f64, Dimension), F
             return Err(Failure::failed(
                 ErrorCode::UnitUnsuitable,
                 format_args!(
-                    "--torque-factor {text} does not go with channel \"{}\", which is in {}; give torque or force per {}, or say \
-                     --torque-unit if the channel is in another unit",
+                    "--torque-factor {text} does not match channel \"{}\", which is in {}; give torque or force per \
+                     {}, or --torque-unit if the channel is in another unit",
                     channel.name, of.text, of.text
                 ),
             ));

@@ -148,7 +148,7 @@ fn keep_topic(inventory: &mut Inventory, wanted: &str) -> Result<(), Failure> {
     if inventory.channels.is_empty() {
         return Err(Failure::failed(
             ErrorCode::ChannelNotFound,
-            format_args!("there is no topic {wanted}; leave --topic out to see all"),
+            format_args!("there is no topic {wanted}; omit --topic to see all"),
         )
         .at(&inventory.file));
     }

@@ -90,7 +90,7 @@ fn check(args: &Inspect) -> Result<(), Failure> {
     if args.files.iter().filter(|file| is_dash(file)).count() > 1 {
         return Err(Failure::usage(
             ErrorCode::ConflictingArguments,
-            "standard input can be read once only; name files",
+            "standard input can be read only once; name files",
         ));
     }
     if args.reading.resample {

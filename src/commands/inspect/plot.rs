@@ -8,7 +8,7 @@ use crate::print::rounded;
 use crate::quality::{labels, unit_of};
 use crate::recording::{Channel, Recording};
 
-/// Label of x where nothing says how the samples lie in time.
+/// Label of x where the sampling rate is unknown.
 const SAMPLES: &str = "sample number, no unit";
 
 /// Height of a channel's panel, in user units.

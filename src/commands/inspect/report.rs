@@ -43,7 +43,7 @@ pub(super) struct InspectedFile {
     pub(super) format: &'static str,
     /// How the recording is written.
     pub(super) dialect: String,
-    /// What else the head of the recording says.
+    /// Other entries in the header of the recording.
     pub(super) details: Vec<Detail>,
     /// Segments of the recording, if it has several.
     pub(super) segments: Vec<Segment>,
@@ -51,7 +51,7 @@ pub(super) struct InspectedFile {
     pub(super) channels: Vec<InspectedChannel>,
     /// What is wrong with the recording.
     pub(super) warnings: Vec<ChannelWarning>,
-    /// Whether announced or begun data are missing.
+    /// Whether declared or started data are missing.
     pub(super) data_lost: bool,
     /// Everything in an MCAP file: topics, encodings, attachments, metadata, chunks.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -72,7 +72,7 @@ pub(super) struct Detail {
 pub(super) struct ChannelWarning {
     /// Stable code of the warning.
     pub(super) code: &'static str,
-    /// The warning for people.
+    /// Human-readable message.
     pub(super) message: String,
     /// Names of the channels that the warning is about; none if it is about the file.
     pub(super) channels: Vec<String>,
@@ -99,7 +99,7 @@ pub(super) struct InspectedChannel {
     pub(super) rate_std_hz: Option<f64>,
     /// Where the rate comes from.
     pub(super) rate_from: String,
-    /// Rate that the head of the file gives, used or not, in Hz.
+    /// Rate given in the header, used or not, in Hz.
     pub(super) header_rate_hz: Option<f64>,
     /// Time of the first sample on the file's own axis, in `start_unit`.
     pub(super) start: Option<f64>,
@@ -107,8 +107,7 @@ pub(super) struct InspectedChannel {
     pub(super) start_ns: Option<i64>,
     /// Unit of `start`: always s.
     pub(super) start_unit: &'static str,
-    /// Date and time of the first sample, or those that the head gives: in ISO 8601 where they can be read in one way only, as
-    /// written otherwise.
+    /// Date and time of the first sample, or those in the header: in ISO 8601 where unambiguous, otherwise as written.
     pub(super) start_time: Option<String>,
     /// Time from the first sample to the last, in s.
     pub(super) duration_s: Option<f64>,
@@ -118,15 +117,15 @@ pub(super) struct InspectedChannel {
     pub(super) jitter: Option<f64>,
     /// Largest deviation of such a step, over the usual step.
     pub(super) jitter_peak: Option<f64>,
-    /// Multiples that the stamps are rounded to, in s, where that alone makes them uneven.
+    /// Rounding of the stamps, in s, where only that makes them uneven.
     pub(super) stamps_rounded_to_s: Option<f64>,
     /// Number of gaps in the stamps; `null` without stamps.
     pub(super) gaps: Option<usize>,
-    /// Samples that the gaps leave out.
+    /// Samples missing in the gaps.
     pub(super) missing_samples: Option<f64>,
     /// The first hundred gaps.
     pub(super) gap_list: Vec<Event>,
-    /// Stamps equal to the one before; `null` without stamps.
+    /// Stamps equal to the previous one; `null` without stamps.
     pub(super) repeated_stamps: Option<usize>,
     /// Steps backwards in time; `null` without stamps.
     pub(super) backwards: Option<usize>,
@@ -140,25 +139,25 @@ pub(super) struct InspectedChannel {
     pub(super) mean: Option<f64>,
     /// Rms of the samples without their mean, in `unit`.
     pub(super) rms: Option<f64>,
-    /// Samples that repeat the one before, over all; 1 for a constant channel.
+    /// Fraction of samples that repeat the previous one; 1 for a constant channel.
     pub(super) repeated: Option<f64>,
     /// Whether that is more than the resolution explains; `null` if unknown.
     pub(super) repeated_unexplained: Option<bool>,
     /// Samples for which each value is held, if constant.
     pub(super) hold: Option<usize>,
-    /// Samples at a value where the signal is cut off.
+    /// Samples at a value where the signal is clipped.
     pub(super) clipped: Option<usize>,
-    /// Lowest value, if the signal is cut off at it, in `unit`.
+    /// Lowest value, if the signal is clipped at it, in `unit`.
     pub(super) clipped_low: Option<f64>,
-    /// Highest value, if the signal is cut off at it, in `unit`.
+    /// Highest value, if the signal is clipped at it, in `unit`.
     pub(super) clipped_high: Option<f64>,
     /// Samples in which the channel is stuck.
     pub(super) stuck: Option<usize>,
     /// Whether all samples are the same.
     pub(super) constant: Option<bool>,
-    /// Samples that are missing or no finite numbers.
+    /// Samples that are missing or not finite.
     pub(super) non_finite: Option<usize>,
-    /// Quantisation step, in `unit`; `null` if too fine to be seen.
+    /// Quantisation step, in `unit`; `null` if too fine to detect.
     pub(super) resolution: Option<f64>,
     /// Bits of the range in steps of `resolution`.
     pub(super) resolution_bits: Option<f64>,

@@ -32,7 +32,7 @@ pub fn files(names: &[PathBuf]) -> (Vec<Warning>, Vec<usize>) {
             Warning::new(
                 "identical-files",
                 format!(
-                    "{} and {} are the same, byte by byte: one record under several names",
+                    "{} and {} are identical, byte for byte: one record under several names",
                     names[group[0]].shown(),
                     others.join(", ")
                 ),

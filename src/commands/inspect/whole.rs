@@ -80,7 +80,7 @@ pub fn describe(all: &AllSamples, kept: InspectedChannel) -> InspectedChannel {
     }
 }
 
-/// The warning that only the first samples were looked at, if that is so of any channel.
+/// The warning that only the first samples were checked, if that is so of any channel.
 pub fn warning(channels: &[Channel], all: &[Option<AllSamples>]) -> Option<Warning> {
     let long = channels.iter().zip(all);
     let long: Vec<(usize, usize)> = long
@@ -91,7 +91,7 @@ pub fn warning(channels: &[Channel], all: &[Option<AllSamples>]) -> Option<Warni
         "first-samples-only",
         format!(
             "{} too long to be kept in memory: samples, duration, range, mean, rms and missing numbers are those of \
-             all samples, all other checks cover the first ones ({kept} of {samples} in the longest)",
+             all samples; all other checks cover the first ones ({kept} of {samples} in the longest)",
             plural(long.len(), "channel"),
         ),
     ))

@@ -19,8 +19,8 @@ impl Drawing<'_> {
             ),
             TransducerSignal::Strain => ("torque_per_strain", "strain at the gage"),
             TransducerSignal::Force => ("torque_per_force", "radius of the beam"),
-            TransducerSignal::Current => ("torque_per_current", "no drawing gives it"),
-            TransducerSignal::Frequency => ("torque_per_frequency", "no drawing gives it"),
+            TransducerSignal::Current => ("torque_per_current", "not available from a drawing"),
+            TransducerSignal::Frequency => ("torque_per_frequency", "not available from a drawing"),
         };
         let (unit, factor) = signal.slope_unit(units);
         let estimate = |(slope, relative): (f64, Option<f64>), source: &'static str| {

@@ -22,7 +22,7 @@ pub(super) struct PredictedConstant {
     pub(super) name: &'static str,
     /// Unit of the values.
     pub(super) unit: String,
-    /// From the drawing, by the plain theory; `null` if the drawing does not give it.
+    /// From the drawing, by the basic theory; `null` if not available from it.
     pub(super) predicted: Option<f64>,
     /// Standard uncertainty of `predicted`, from the uncertainties of the drawing; `null` if unknown.
     pub(super) predicted_std: Option<f64>,
@@ -34,13 +34,13 @@ pub(super) struct PredictedConstant {
     pub(super) measured_source: Option<String>,
     /// `100 (predicted − measured) / measured`.
     pub(super) residual_percent: Option<f64>,
-    /// What in the model explains at least half of the residual; `null` if nothing does.
+    /// Part of the model that explains at least half of the residual; `null` if none does.
     pub(super) explained_by: Option<String>,
     /// Theory by which `predicted` follows.
     pub(super) by: &'static str,
-    /// What adding each effect of the drawing makes of the prediction, one after the other.
+    /// The prediction as each effect of the drawing is added in turn.
     pub(super) refinements: Vec<Refinement>,
-    /// What else is to be said about the residual.
+    /// Further remarks on the residual.
     pub(super) note: Option<String>,
 }
 

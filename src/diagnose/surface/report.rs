@@ -18,14 +18,13 @@ const SPOKEN_OF: f64 = 0.1;
 /// memory.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ForceSurface {
-    /// Where it sits.
+    /// Its location.
     pub place: SurfacePlace,
-    /// Whether no law is named because it explains so much more than the best of them.
+    /// Whether no law is named because this explains far more than the best of them.
     pub outdoes_laws: bool,
-    /// Rms that it leaves of training samples that it was not fitted to, by the motion that was measured there; in the unit of
-    /// `error`.
+    /// Residual rms of training samples not used in its fit, given the motion measured there; in the unit of `error`.
     pub train_rms: f64,
-    /// Rms that it leaves of the hold-out records, by the motion that was measured there.
+    /// Residual rms of the hold-out records, given the motion measured there.
     pub holdout_rms: f64,
     /// What each part of it explains.
     pub shares: SurfaceShares,
@@ -35,7 +34,7 @@ pub struct ForceSurface {
     pub over_speed: Vec<SurfacePoint>,
     /// What its parts look like.
     pub looks_like: Vec<String>,
-    /// Effects and laws that come nearest: hypotheses, not findings.
+    /// Closest effects and laws: hypotheses, not findings.
     pub nearest: Vec<&'static str>,
 }
 

@@ -37,7 +37,7 @@ impl Resemblance {
 
     pub fn loop_of_history() -> Self {
         Self::new(
-            "a loop: the torque depends on the way that led to a displacement",
+            "a loop: the torque depends on the path to a displacement",
             &["bouc-wen-hysteresis", "backlash"],
         )
     }
@@ -118,11 +118,14 @@ pub fn of_displacement(points: &[SurfacePoint], place: SurfacePlace) -> Resembla
         (&below, corners),
     ]);
     let Some((shape, amount, corner)) = found else {
-        return Resemblance::new("a torque over the displacement of no simple shape", &[]);
+        return Resemblance::new("a torque with no simple dependence on displacement", &[]);
     };
     if place == SurfacePlace::Gage {
         let nearest: &[&str] = &["gage-nonlinearity", "saturation"];
-        return Resemblance::new("a curved line of the gage or its amplifier", nearest);
+        return Resemblance::new(
+            "a nonlinear characteristic of the gage or its amplifier",
+            nearest,
+        );
     }
     let is_near = corner < STOP * curve.largest;
     let grows = amount > 0.0;
@@ -142,7 +145,7 @@ pub fn of_displacement(points: &[SurfacePoint], place: SurfacePlace) -> Resembla
         (2, true) if is_near => Resemblance::new("a gap around zero", &["backlash"]),
         (2, true) => Resemblance::new("a stop in both directions", &["end-stop"]),
         (2, false) => Resemblance::new(
-            "a torque that grows less beyond some displacement",
+            "a torque that rises more slowly beyond some displacement",
             &["bouc-wen-hysteresis", "saturation"],
         ),
         (3, true) | (4, true) => Resemblance::new("a stop in one direction", &["end-stop"]),
@@ -186,7 +189,7 @@ pub fn of_speed(points: &[SurfacePoint]) -> Resemblance {
         Some((1 | 2, false)) => {
             Resemblance::new("damping that falls with the speed", &["coulomb-friction"])
         }
-        _ => Resemblance::new("a torque over the speed of no simple shape", &[]),
+        _ => Resemblance::new("a torque with no simple dependence on speed", &[]),
     }
 }
 
@@ -219,7 +222,7 @@ mod tests {
         assert_eq!(of(&|x| 5.0 * (x - 1.2).max(0.0)), "end-stop");
         assert_eq!(of(&|x| x.clamp(-1.0, 1.0)), "bouc-wen-hysteresis");
         let wavy = of_displacement(&curve(|x| (7.0 * x).sin()), SurfacePlace::Stand);
-        assert!(wavy.nearest.is_empty() && wavy.words.ends_with("no simple shape"));
+        assert!(wavy.nearest.is_empty() && wavy.words.contains("no simple dependence"));
     }
 
     #[test]

@@ -40,8 +40,8 @@ pub(super) fn damping_law(
         result.warn(
             "not-viscous",
             format!(
-                "{} damping describes the envelope better than viscous damping (residual {} instead of {}): one \
-                 damping ratio does not describe this decay",
+                "{} damping fits the envelope better than viscous damping (residual {} instead of {}): no single \
+                 damping ratio describes this decay",
                 best.law.name(),
                 rounded(best.rms, 3),
                 rounded(viscous.rms, 3)

@@ -119,8 +119,8 @@ pub fn check(record: &Ringing) -> Result<Vec<Warning>, Failure> {
 }
 
 /// Consequence of a restart where a decay is fitted as a whole.
-const NOT_ONE: &str = "a hand or a brake that was put on the stand would look the same, and the decay does not follow from one \
-                       state at its start; cut the record there with --range";
+const NOT_ONE: &str = "a hand or a brake applied to the stand would look the same, and no single initial state \
+    describes the decay; cut the record there with --range";
 
 /// The residual, relative to the oscillation about offset and drift.
 fn quality(fit: &ModesFit, stretches: &[Stretch]) -> FitQuality {

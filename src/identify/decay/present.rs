@@ -16,8 +16,8 @@ pub(super) fn fit_warnings(result: &mut Identification, fit: &ModesFit) {
         result.warn(
             "close-lines",
             format!(
-                "the residual has a line within 3 % of {} Hz: a second mode close by (then give --modes), or a \
-                 frequency or damping that changes with amplitude or time",
+                "the residual has a line within 3 % of {} Hz: a second mode close by (then give --modes), or frequency \
+                 or damping that changes with amplitude or time",
                 rounded(frequency_hz, 4)
             ),
         );
@@ -127,8 +127,8 @@ pub(super) fn apart(result: &mut Identification, fit: &ModesFit, stretches: usiz
         result.warn(
             "decays-apart",
             format!(
-                "some decays ring at {} Hz and others at {} Hz, none at both: the stand was changed between them, or these \
-                 are records of different stands; identify them one by one",
+                "some decays ring at {} Hz and others at {} Hz, none at both: the stand was changed between them, or \
+                 they are of different stands; identify them one by one",
                 rounded(hz(k), 5),
                 rounded(hz(l), 5)
             ),
@@ -167,8 +167,8 @@ pub(super) fn poor(
         result.warn(
             "poor-fit",
             format!(
-                "the residual is {} % of the swing: this is hardly a free decay; cut the record with --range to where \
-                 nothing drives the stand, or choose another --channel",
+                "the residual is {} % of the decay: this is hardly free ringing; select a part where nothing drives \
+                 the stand with --range, or choose another --channel",
                 rounded(100.0 * relative, 2)
             ),
         );
@@ -176,9 +176,9 @@ pub(super) fn poor(
         result.warn(
             "poor-fit",
             format!(
-                "the residual, {} % of the swing, is {} times as large while the stand rings as behind that: it is no noise, \
-                 but something else that the hit sets off (an amplifier that is AC coupled or bends at its limit, a part \
-                 that rattles), and frequency and damping are less certain than their std says",
+                "the residual, {} % of the decay, is {} times as large while the stand rings as afterwards: it is not \
+                 noise, but something else set off by the hit (an amplifier that is AC coupled or near its limit, a \
+                 part that rattles), and frequency and damping are less certain than their std says",
                 rounded(100.0 * relative, 2),
                 rounded(falls, 2)
             ),
@@ -217,7 +217,7 @@ fn falls(fit: &ModesFit, stretches: &[Stretch], main: usize) -> f64 {
 
 pub(super) fn method(fit: &ModesFit, stretches: usize) -> String {
     format!(
-        "nonlinear least squares: {} over {}, {} samples, each stretch with an offset and a drift of its own",
+        "nonlinear least squares: {} over {}, {} samples, each stretch with its own offset and drift",
         plural(fit.poles.len(), "decaying sine"),
         plural(stretches, "stretch"),
         fit.fit.residuals.len()
@@ -225,8 +225,8 @@ pub(super) fn method(fit: &ModesFit, stretches: usize) -> String {
 }
 
 /// Note about a removed baseline.
-pub(super) const BASELINE: &str = "the zero moves while the stand rings (an amplifier that is AC coupled or settles, a part that \
-                                   warms up): it was fitted with a smooth curve and taken off";
+pub(super) const BASELINE: &str = "the zero moves during the decay (an amplifier that is AC coupled or settles, a part \
+    that warms up): it was fitted with a smooth curve and subtracted";
 
 /// Reports strongly correlated decay rates and frequencies.
 pub(super) fn correlations(result: &mut Identification, fit: &ModesFit) {

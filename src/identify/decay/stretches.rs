@@ -68,7 +68,7 @@ pub(super) fn stretches(
             format!("{start} to {end} Hz")
         });
         result.method.push(format!(
-            "filtered to {} and decimated to one sample in {}: nothing rings beside that",
+            "filtered to {} and decimated to one sample in {}: no decay outside that band",
             bands.collect::<Vec<_>>().join(", "),
             few.factor
         ));
@@ -250,13 +250,13 @@ impl Cuts {
             .extend(present::restart(&self.restarts_s, OWN_PARTS));
         if left_clipped > 0 {
             result.method.push(format!(
-                "each decay is fitted from its last clipped sample on; {left_clipped} samples before that are left out"
+                "each decay is fitted from its last clipped sample on; {left_clipped} samples before that are excluded"
             ));
         }
         if left_out > 0 {
             result.method.push(format!(
-                "each decay is fitted up to twice the time after which its ringing is lost in the noise; {left_out} samples \
-                 of noise behind that are left out"
+                "each decay is fitted up to twice the time after which it is lost in the noise; {left_out} later \
+                 samples of noise are excluded"
             ));
         }
         if self.stretches.is_empty() {
@@ -280,8 +280,8 @@ impl Cuts {
 }
 
 /// Consequence of a restart where its parts are separate decays.
-pub(super) const OWN_PARTS: &str = "the parts before and after that are fitted as decays of their own; hit once and take your hand off the \
-                         stand";
+pub(super) const OWN_PARTS: &str = "the parts before and after are fitted as separate decays; hit once, and keep your hands off \
+    the stand";
 
 /// Times at which a decay of a record restarts.
 pub(super) fn restarts_s(record: &Ringing) -> Vec<f64> {
@@ -329,8 +329,8 @@ fn clipped_times(record: &Ringing, result: &mut Identification) -> Vec<f64> {
         result.warn(
             "clipped",
             format!(
-                "{}: the first peaks of the decay are flat, as of an amplifier that was overdriven before its filter: the \
-                 decay is fitted behind them; tap more softly, or set a smaller gain",
+                "{}: the first peaks of the decay are flat, as from an amplifier overdriven before its filter: the \
+                 decay is fitted after them; tap more gently, or use a smaller gain",
                 record.name
             ),
         );

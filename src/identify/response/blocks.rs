@@ -244,7 +244,7 @@ fn whole_transients(recorded: &[Driven], result: &mut Identification) -> Set {
     set.of_differences = true;
     result
         .method
-        .push("each record taken as one transient, whatever its shape".to_owned());
+        .push("each record treated as a single transient, of any shape".to_owned());
     set
 }
 
@@ -413,9 +413,9 @@ fn periodic(
             format_args!("the records are shorter than one period of {period} samples"),
         ));
     }
-    result.method.push(format!(
-        "periods of {period} samples, without the first one"
-    ));
+    result
+        .method
+        .push(format!("periods of {period} samples, without the first"));
     Ok(Set::new(all, rate_hz / period as f64, Window::None))
 }
 
@@ -434,7 +434,7 @@ fn report_noise(result: &mut Identification, name: &str, found: &frf::Periodic) 
     });
     let decibel = |power: f64| rounded(10.0 * (power.max(1e-300) / signal).log10(), 3);
     result.method.push(format!(
-        "{name}: relative to the response, noise {} dB, distortion at lines that are not excited {}",
+        "{name}: relative to the response, noise {} dB, distortion at unexcited lines {}",
         decibel(noise),
         if others > 0.0 {
             format!("{} dB", decibel(others))
@@ -446,7 +446,7 @@ fn report_noise(result: &mut Identification, name: &str, found: &frf::Periodic) 
         result.warn(
             "nonlinear",
             format!(
-                "{name}: the response has more power at frequencies that were not applied than noise explains ({} dB): \
+                "{name}: at frequencies that were not excited the response has more power than noise explains ({} dB): \
                  the stand is nonlinear at this level",
                 decibel(others)
             ),

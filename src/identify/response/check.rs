@@ -128,8 +128,8 @@ pub(super) fn doubts(result: &mut Identification, found: &FinalFit, leads: bool)
         result.warn(
             "poor-fit",
             format!(
-                "the residual of {} is {} % of the measured signal: more modes are there, or the applied signal does not \
-                 explain it; leave out or raise --modes, check the coherence (--html), and choose another --band",
+                "the residual of {} is {} % of the measured signal: there are more modes, or the applied signal does \
+                 not explain it; omit or raise --modes, check the coherence (--html), and choose another --band",
                 plural(found.modal.poles.len(), "mode"),
                 rounded(100.0 * found.relative, 2)
             ),
@@ -152,9 +152,9 @@ pub(super) fn short_pulses(result: &mut Identification, part: f64) {
         result.warn(
             "short-pulse",
             format!(
-                "the pulses of the hammer last few samples, so that frequencies above half the rate fold into their spectrum: \
-                 gains may be wrong by about {} %, which their uncertainties do not include, unless the recorder has an \
-                 anti-aliasing filter; record faster, or hit with a softer tip",
+                "the hammer pulses last only a few samples, so frequencies above half the rate alias into their \
+                 spectrum: gains may be wrong by about {} %, which their uncertainties do not include, unless the \
+                 recorder has an anti-aliasing filter; record at a higher rate, or use a softer tip",
                 rounded(100.0 * OF_GAIN * part, 1)
             ),
         );
@@ -170,9 +170,9 @@ pub(super) fn noise_on_force(result: &mut Identification, part: f64) {
         result.warn(
             "noise-on-force",
             format!(
-                "something slow follows the strokes of the hammer (a hammer that is AC coupled, a zero that drifts), so that \
-                 the noise beside them cannot be taken off: the response is about {} % too small by it, which its \
-                 uncertainties do not include; couple the hammer directly (DC), or reduce its noise",
+                "a slow signal follows the hammer strokes (AC coupling, a drifting zero), so the noise outside them \
+                 cannot be subtracted: the response is about {} % too small, which its uncertainties do not include; \
+                 use DC coupling for the hammer, or reduce its noise",
                 rounded(100.0 * part, 2)
             ),
         );
@@ -185,9 +185,9 @@ fn noise_before_resonance(result: &mut Identification, gain_error: f64) {
         result.warn(
             "noise-before-resonance",
             format!(
-                "the residual follows the resonance: something else drives the stand, or the applied signal is recorded \
-                 with noise, which makes the gain up to {} % too small (and J, f and K as much too large); their \
-                 uncertainties allow for it; reduce the noise of --applied or excite more",
+                "the residual follows the resonance: something else drives the stand, or the applied signal is noisy, \
+                 which makes the gain up to {} % too small (and J, f and K as much too large); their uncertainties \
+                 allow for it; reduce the noise of --applied or excite more",
                 rounded(100.0 * gain_error, 2)
             ),
         );

@@ -115,9 +115,9 @@ pub(super) fn warn(
         result.warn(
             "ac-coupled-or-drift",
             format!(
-                "the fit needs a slow part, at {} Hz: a channel drifts or is AC coupled; this part is left out of the modes and \
-                 of the static gain, which then rests on the modes alone; record both channels with DC coupling, or check \
-                 the static gain with a weight",
+                "the fit needs a slow component, at {} Hz: a channel drifts or is AC coupled; it is excluded from the \
+                 modes and from the static gain, which then rests on the modes alone; record both channels with DC \
+                 coupling, or check the static gain with a weight",
                 drift.join(", ")
             ),
         );
@@ -127,8 +127,8 @@ pub(super) fn warn(
         result.warn(
             "mode-out-of-reach",
             format!(
-                "the fit has a mode at {} Hz, above all frequencies of the records: it is left out, and the static gain is not \
-                 determined; narrow the --band, or choose fewer --modes",
+                "the fit has a mode at {} Hz, above all frequencies of the records: it is dropped, and the static gain \
+                 is not determined; narrow the --band, or choose fewer --modes",
                 beyond.join(", ")
             ),
         );
@@ -143,9 +143,9 @@ pub(super) fn undamped(result: &mut Identification, frequencies_hz: &[String]) {
         result.warn(
             "undamped-left-out",
             format!(
-                "the modes at {} Hz have no damping that these data show and are left out: a steady tone (of the mains, of a \
-                 fan), noise or a nonlinear stand makes such modes; switch off what hums, choose fewer --modes, or record \
-                 at one level and for longer",
+                "the modes at {} Hz have no measurable damping in these data and are dropped: a steady tone (mains, a \
+                 fan), noise or a nonlinear stand causes such modes; switch off the source, choose fewer --modes, or \
+                 record at one level and for longer",
                 frequencies_hz.join(", ")
             ),
         );
@@ -154,4 +154,4 @@ pub(super) fn undamped(result: &mut Identification, frequencies_hz: &[String]) {
 
 /// Note if no mode belongs to the stand.
 pub(super) const NONE: &str =
-    "no mode has a damping that these records show; record for longer, or choose another --band";
+    "no mode has measurable damping in these records; record for longer, or choose another --band";

@@ -219,8 +219,9 @@ fn without_undamped(
     }
 }
 
-const ONE_HIT: &str = "one hit does not show the error of its own force (noise, and what is folded), which decides the \
-    uncertainties here: those of frequency and damping are upper limits, that of the static gain can be too small; take several hits";
+const ONE_HIT: &str = "a single hit does not show the error of its force (noise and aliasing), which dominates the \
+    uncertainties: those of frequency and damping are upper limits, that of the static gain may be too small; take \
+    several hits";
 
 /// The final fit: to whole records without a window if the window causes leakage, otherwise to the averaged
 /// response.

@@ -207,7 +207,7 @@ pub(super) fn warn(result: &mut Identification, delay_s: f64) {
     result.warn(
         "channels-shifted",
         format!(
-            "the {which} channel is about {} ms late against the other: a delay was fitted, as with --delay, which explains \
+            "the {which} channel lags the other by about {} ms: a delay was fitted, as with --delay, which explains \
              more than modes alone; check that one recorder takes both channels, with the same filters",
             rounded(1e3 * delay_s.abs(), 3)
         ),

@@ -38,13 +38,13 @@ pub(super) fn method(result: &mut Identification, run: &FreeRun, fitted: &Fitted
     let all = fitted.used.len();
     let used = fitted.used.iter().filter(|u| **u).count();
     let which = if used < all {
-        format!("{used} of {all} windows; in the others the body reverses or stands")
+        format!("{used} of {all} windows; in the others the body reverses or is at rest")
     } else {
         format!("{all} windows")
     };
     result.method.push(format!(
-        "least squares on the equation of motion averaged over windows of ±{} s ({which}); the derivatives are those of \
-         the window's weight",
+        "least squares on the equation of motion averaged over windows of ±{} s ({which}); derivatives act on the \
+         window function (weak form)",
         short(fitted.rows.half as f64 / run.rate_hz),
     ));
     if fitted.fit.coloured > COLOURED {
@@ -97,14 +97,14 @@ pub(super) fn warnings(
     } else if !directions.both() {
         result.warn(
             "one-direction",
-            "the body moves in one direction only, so dry friction and offset are one number; run it in both \
-             directions to separate them",
+            "the body moves in one direction only, so dry friction and offset cannot be separated; run it in both \
+             directions",
         );
     }
     if options.by_direction && directions.both() {
         result.warn(
             "dry-friction-by-direction",
-            "dry friction that differs by direction looks the same as an offset of the torque: if the torque has no \
+            "dry friction that differs by direction cannot be distinguished from a torque offset: if the torque has no \
              offset, dry_friction ± offset is the dry friction in each direction",
         );
     }
@@ -135,8 +135,8 @@ fn shifted(result: &mut Identification, fitted: &FittedRows) {
     result.warn(
         "channels-shifted",
         format!(
-            "the {} is about {} ms late against the {}, or shown by a filter, which the constants, and viscous friction most of \
-             all, do not allow for; record both channels with one recorder and the same filters",
+            "the {} is about {} ms late relative to the {}, or is filtered, which the constants, viscous friction \
+             above all, do not allow for; record both channels with one recorder and the same filters",
             which[0],
             rounded(1e3 * shift_s.abs(), 2),
             which[1]
@@ -156,9 +156,9 @@ fn poor(result: &mut Identification) {
         result.warn(
             "poor-fit",
             format!(
-                "the residual is {} % of the torque: the motion does not explain it; check that the channels are the right ones \
-                 (a speed with its sign, an angle that runs on over full turns, the torque on the same shaft), that neither is \
-                 clipped, and cut the record with --range to where the drive runs",
+                "the residual is {} % of the torque: the motion does not explain it; check the channels (a speed with \
+                 its sign, an angle that does not wrap at full turns, the torque on the same shaft) and that neither \
+                 is clipped, and select the part where the drive runs with --range",
                 rounded(100.0 * relative, 2)
             ),
         );

@@ -73,8 +73,8 @@ pub(super) fn refuse_mixed(points: &[Point]) -> Result<(), Failure> {
             return Err(Failure::failed(
                 ErrorCode::UnsuitableRecord,
                 format_args!(
-                    "--{flag}: the rows of {open} different numbers are mixed ({MOST_OPEN} at most); check that the column numbers \
-                     the {}, and sort the rows in the order in which they were taken",
+                    "--{flag}: the rows of {open} different numbers are interleaved (at most {MOST_OPEN}); check that \
+                     the column numbers the {}, and sort the rows in the order in which they were taken",
                     if flag == "series" {
                         "series"
                     } else {

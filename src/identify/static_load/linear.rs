@@ -74,8 +74,8 @@ pub(super) fn refuse_two_ranges(points: &[Point], steps: &LoadSteps) -> Result<(
     Err(Failure::failed(
         ErrorCode::UnsuitableRecord,
         format_args!(
-            "the sensitivity jumps: from the load {} on, the readings are {} times as large for the same load as below, as with \
-             two ranges of an amplifier; record all loads in one range, or evaluate the rows of each range by themselves",
+            "the sensitivity jumps: from load {} on it is {} times that below, as with two ranges of an amplifier; \
+             record all loads in one range, or evaluate the rows of each range separately",
             rounded(from, 4),
             rounded(ratio, 3)
         ),
@@ -115,18 +115,19 @@ pub(super) fn warn(
     }
     let why = match limit(&means, curve, steps) {
         Some(load) => format!(
-            "the reading hardly rises beyond the load {}: amplifier or recorder is at its limit; leave out the loads beyond, and \
-             choose a larger range",
+            "the reading hardly rises beyond load {}: amplifier or recorder is at its limit; omit the loads beyond it, \
+             and choose a larger range",
             rounded(load, 4)
         ),
-        None => "the characteristic is curved, or one load or reading is wrong: look at the residual (--html), and use --degree 3 \
-                 if it bends evenly"
+        None => "the characteristic is nonlinear, or a load or reading is wrong: inspect the residual (--html), and \
+            use --degree 3 if it is a smooth curve"
             .to_owned(),
     };
     result.warn(
         "not-linear",
         format!(
-            "the mean readings lie {} % of the deflection off the curve, {} times what their scatter explains: {why}",
+            "the mean readings deviate from the curve by {} % of the deflection, {} times what their scatter explains: \
+             {why}",
             rounded(100.0 * off / deflection, 2),
             rounded(off * each / scatter.max(f64::MIN_POSITIVE), 2)
         ),

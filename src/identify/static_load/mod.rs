@@ -115,8 +115,8 @@ pub fn identify(
         return Err(Failure::failed(
             ErrorCode::TooFewSamples,
             format_args!(
-                "{} in {} are too few for a curve of degree {degree} and its error; apply at least {}, the empty stand \
-             included{or}",
+                "{} in {} are too few for a curve of degree {degree} and its error; apply at least {}, including no \
+                 load{or}",
                 plural(count, "different load"),
                 plural(points.len(), "row"),
                 degree + 2
@@ -152,7 +152,7 @@ pub fn identify(
     if is_one_weight {
         result.warn(
             "one-weight",
-            "with one load beside no load, a curved characteristic would not show; apply other loads as well, or stay near \
+            "a single load besides zero does not reveal a nonlinear characteristic; apply further loads, or stay near \
              this one",
         );
     }
@@ -170,8 +170,8 @@ fn contradicted(result: &mut Identification, fit: &LoadCurve) {
         result.warn(
             "std-contradicted",
             format!(
-                "the readings scatter by {} times the standard uncertainties that --std gives: check their unit, which is that of \
-                 the readings unless the heading names another, or leave out --std",
+                "the readings scatter by {} times the standard uncertainties of --std: check their unit, which is that \
+                 of the readings unless the heading names another, or omit --std",
                 rounded(ratio, 2)
             ),
         );
@@ -275,8 +275,8 @@ fn method(result: &mut Identification, fit: &LoadCurve, points: &[Point], unit: 
         "{} regression of the reading on the load over {} points, loading and unloading together{}{}",
         if is_weighted { "weighted" } else { "unweighted" },
         points.len(),
-        if fit.has_even_drift { ", with an even drift of the zero" } else { "" },
-        if fit.has_hysteresis { ", with a hysteresis at each load" } else { "" }
+        if fit.has_even_drift { ", with a linear drift of the zero" } else { "" },
+        if fit.has_hysteresis { ", with hysteresis at each load" } else { "" }
     ));
     let spreads = &fit.spreads;
     let allowed = [
@@ -367,8 +367,8 @@ fn poor(result: &mut Identification, relative: f64) {
         result.warn(
             "poor-fit",
             format!(
-                "the residual is {} of the range of the readings: check that the columns are the right ones and the rows in \
-                 the order in which they were taken, or use --degree 3",
+                "the residual is {} of the range of the readings: check the columns and that the rows are in the order \
+                 in which they were taken, or use --degree 3",
                 print::relative(relative, 2)
             ),
         );
@@ -384,8 +384,8 @@ fn warnings(result: &mut Identification, points: &[Point], (degree, steps): (usi
             match has_empty {
                 true => "the loads were applied only once: repeatability is unknown",
                 false => {
-                    "there is no row without load, by which one series of loads is told from the next: repeatability is \
-                     unknown; add the readings without load, or a column that numbers the series (--series)"
+                    "no row without load separates the series of loads: repeatability is unknown; add the readings \
+                     without load, or a column that numbers the series (--series)"
                 }
             },
         );
@@ -393,13 +393,13 @@ fn warnings(result: &mut Identification, points: &[Point], (degree, steps): (usi
     if steps.is_rising.iter().all(|is_rising| *is_rising) {
         result.warn(
             "no-unloading",
-            "there are no readings during unloading: hysteresis is unknown",
+            "no readings were taken during unloading: hysteresis is unknown",
         );
     }
     if degree > 1 {
         result.warn(
             "curve",
-            "the constants are the slope of the curve at no load; at large loads use the curve",
+            "the constants are the slope of the curve at no load; for large loads use the curve",
         );
     }
 }

@@ -44,9 +44,9 @@ pub(super) fn drifting(
         result.warn(
             "zero-drifts",
             format!(
-                "without load the reading went from {} to {} {unit} over the test, by {} of the largest deflection: the zero \
-                 is that of the middle of the test, and no other record has it; warm up for longer, and read the zero of each \
-                 record",
+                "the zero reading drifted from {} to {} {unit} over the test, by {} of the largest deflection: the \
+                 fitted zero is that of the middle of the test and does not apply to other records; allow a longer \
+                 warm-up, and read the zero of each record",
                 rounded(first.reading, 4),
                 rounded(last.reading, 4),
                 print::relative(part, 2)

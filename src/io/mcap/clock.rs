@@ -53,8 +53,7 @@ impl ClockCheck {
         let length = end.saturating_sub(start) as f64;
         if first.saturating_abs() > DAY_NS {
             said.push(format!(
-                "the messages' own clock and the recorder's differ by {:.0} s: they do not count \
-                 from the same time",
+                "the messages' own clock and the recorder's differ by {:.0} s: they have different epochs",
                 first as f64 / 1e9
             ));
         }
@@ -91,7 +90,7 @@ mod tests {
     #[test]
     fn other_zeros_and_drift_are_said() {
         let day = 100_000 * 1_000_000_000_u64;
-        assert!(said(&[(1, day)])[0].contains("do not count from the same time"));
+        assert!(said(&[(1, day)])[0].contains("they have different epochs"));
         let second = 1_000_000_000;
         assert!(said(&[(1, 1), (2 * second, 1_000_000_000)])[0].contains("drift apart by 1.000 s"));
         assert!(said(&[(0, 1)])[0].contains("time stamp of zero"));

@@ -82,7 +82,7 @@ pub struct ChannelReport {
     pub publish_ns: Option<(u64, u64)>,
     /// Messages per second by log time; none with fewer than two messages or no time between.
     pub rate_hz: Option<f64>,
-    /// Messages logged before the one in front of them.
+    /// Messages logged before the preceding one.
     pub out_of_order: u64,
     /// Why the messages cannot be read; `null` if they can.
     pub unreadable: Option<String>,
@@ -99,9 +99,9 @@ pub struct ChannelReport {
 pub struct LeafReport {
     /// Path; lists with `[]`, arrays with `[3]`.
     pub path: String,
-    /// FieldKind of number.
+    /// Kind of number.
     pub kind: &'static str,
-    /// Unit, if the file tells it.
+    /// Unit, if given in the file.
     pub unit: Option<String>,
     /// Value in the first message, of the first item in lists.
     pub example: Option<f64>,
@@ -372,7 +372,7 @@ impl Scan {
         for channel in channels {
             if channel.out_of_order > 0 {
                 let message = format!(
-                    "{}: {} of {} messages were logged before the one in front of them",
+                    "{}: {} of {} messages were logged before the preceding one",
                     channel.topic, channel.out_of_order, channel.messages
                 );
                 say("mcap-out-of-order", message);
@@ -382,7 +382,7 @@ impl Scan {
             }
         }
         if self.broken > 0 {
-            let message = format!("{} message records are cut short", self.broken);
+            let message = format!("{} message records are truncated", self.broken);
             say("mcap-skipped", message);
         }
         warnings.extend(summary::conflict(self.channels.conflicts));

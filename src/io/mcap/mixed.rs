@@ -34,8 +34,8 @@ impl Publishers {
 /// Text about interleaved messages of two channels of a topic.
 pub(super) fn two_publishers([one, other]: [u16; 2]) -> String {
     format!(
-        "its channels {one} and {other} have messages between each other's: two nodes publish on it, and their samples are not \
-         one signal; record one of them alone, or split the file by channel"
+        "its channels {one} and {other} have interleaved messages: two nodes publish on it, and their samples are not \
+         one signal; record only one of them, or split the file by channel"
     )
 }
 
@@ -65,8 +65,8 @@ pub(super) fn one_frame<'a>(
     match (0..frames.len()).find_map(|place| Some([&frames[place], between(place)?])) {
         None => Ok(()),
         Some([one, other]) => Err(format!(
-            "its messages are by turns of the frames \"{one}\" and \"{other}\": two sensors share it, and their samples are \
-             not one signal; publish each on a topic of its own, or split the file by frame_id"
+            "its messages alternate between the frames \"{one}\" and \"{other}\": two sensors share it, and their \
+             samples are not one signal; publish each on a separate topic, or split the file by frame_id"
         )),
     }
 }

@@ -41,7 +41,7 @@ impl FieldChoice {
             )),
             (Some(_), None) if self.field.is_some() => Err(Failure::usage(
                 ErrorCode::ConflictingArguments,
-                "--signal names topic and field in one: leave --field out",
+                "--signal names topic and field in one: omit --field",
             )),
             (Some(signal), None) => Ok(FieldRequest::Signal(signal.clone())),
             (None, Some(topic)) => {

@@ -107,8 +107,8 @@ impl Tally {
         }
         if let (Some(by_name), 1..) = (&signal.by_name, self.moved) {
             let message = format!(
-                "{topic}: the item that {field} is in the first message has another place in {} later ones; it was followed \
-                 by its name, as {by_name} does",
+                "{topic}: the item that {field} is in the first message changes its index in {} later ones; it was \
+                 tracked by its name, as {by_name} does",
                 self.moved
             );
             say("mcap-items-move", message);
@@ -116,8 +116,8 @@ impl Tally {
         let without_spacing = signal.blocks.without_spacing;
         if self.without_time + broken + without_spacing > 0 {
             let message = format!(
-                "{topic}: {} messages without a usable time, {without_spacing} without a usable spacing \
-                 of their samples and {broken} cut short were left out",
+                "{topic}: {} messages without a usable time, {without_spacing} without a usable sample spacing and \
+                 {broken} truncated were skipped",
                 self.without_time
             );
             say("mcap-skipped", message);
@@ -163,8 +163,7 @@ impl SignalSummary {
 /// Warning about declarations that contradict an earlier one.
 pub(super) fn conflict(conflicts: u64) -> Option<Warning> {
     let message = format!(
-        "{conflicts} schemas or channels are declared again with another content; the first \
-         declaration was used"
+        "{conflicts} schemas or channels are declared again with different content; the first declaration was used"
     );
     (conflicts > 0).then(|| Warning::new("mcap-conflict", message))
 }
@@ -197,15 +196,14 @@ fn out_of_order(topic: &str, sorter: &Sorter) -> Vec<Warning> {
     let mut say = |code, message: String| warnings.push(Warning::new(code, message));
     if sorter.out_of_order > 0 {
         let message = format!(
-            "{topic}: {} samples came after a later one and were put in order",
+            "{topic}: {} samples arrived after a later one and were sorted",
             sorter.out_of_order - sorter.too_late
         );
         say("mcap-out-of-order", message);
     }
     if sorter.too_late > 0 {
         let message = format!(
-            "{topic}: {} samples came more than {WINDOW} samples late and were left out; sort \
-                 the file by time first",
+            "{topic}: {} samples arrived more than {WINDOW} samples late and were dropped; sort the file by time first",
             sorter.too_late
         );
         say("mcap-too-late", message);

@@ -208,7 +208,7 @@ fn plausible_rate(rate_hz: f64) -> Option<f64> {
 fn cut(what: &str) -> Warning {
     Warning::new(
         "file-cut",
-        format!("the file ends early: {what}; copy it again if it is longer elsewhere"),
+        format!("the file ends early: {what}; copy it again if the original is longer"),
     )
 }
 

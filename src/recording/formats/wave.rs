@@ -181,7 +181,7 @@ fn data(
     if reading.full_scale.is_none() {
         content.warnings.push(Warning::new(
             "full-scale-unknown",
-            "the samples are fractions of full scale (-1 to 1), and a WAV file does not say what that is; give it with its \
+            "the samples are fractions of full scale (-1 to 1), which a WAV file does not state; give it with its \
              unit, as --full-scale \"10 V\"",
         ));
     }

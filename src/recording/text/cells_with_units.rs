@@ -35,9 +35,9 @@ pub fn left_out(head: &Head, table: &Table, first: usize, header: &Header) -> Ve
         Some(Warning::new(
             CODE,
             format!(
-                "line {}: column {} (\"{heading}\") reads \"{cell}\": only plain numbers are read, so that the column was \
-                 left out; take the units off its cells, bring all of them to one unit, and write that in the heading: \
-                 \"{} [{unit}]\"",
+                "line {}: column {} (\"{heading}\") reads \"{cell}\": only plain numbers are read, so the column was \
+                 skipped; remove the units from its cells, convert all of them to one unit, and put that in the \
+                 heading: \"{} [{unit}]\"",
                 head.number(first),
                 place + 1,
                 field.name

@@ -52,7 +52,7 @@ impl Decoding {
                 warnings.push(Warning::new(
                     "unreadable-characters",
                     format!(
-                        "some bytes are no characters of {}; they were replaced by \u{FFFD}",
+                        "some bytes are not valid {}; they were replaced by \u{FFFD}",
                         encoding::name(encoding)
                     ),
                 ));

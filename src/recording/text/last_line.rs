@@ -63,8 +63,8 @@ impl LastLine {
             Self::Suspect => Some(Warning::new(
                 "unended-last-line",
                 format!(
-                    "{place}: this last line (\"{}\") has no line end, unlike the others: its last number may be cut. \
-                     It was used; check the last sample, or copy the file again",
+                    "{place}: this last line (\"{}\") has no line ending, unlike the others: its last number may be \
+                     truncated. It was used; check the last sample, or copy the file again",
                     shortened(line)
                 ),
             )),
@@ -82,8 +82,7 @@ pub fn truncated(line: &str, text: &str) -> Warning {
     Warning::new(
         "truncated-last-line",
         format!(
-            "{line}: the file ends in the middle of this line (\"{}\"); it was left out, \
-             everything before it was used",
+            "{line}: the file ends in the middle of this line (\"{}\"); it was skipped, everything before it was used",
             shortened(text)
         ),
     )

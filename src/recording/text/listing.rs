@@ -39,8 +39,8 @@ pub fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
         return Err(Failure::failed(
             ErrorCode::NotARecording,
             format_args!(
-                "the file is a list of results, not a recording: each of its {} rows from line {} on has a \
-             name of its own in the first column; expected rows of numbers, one row for each moment",
+                "the file is a list of results, not a recording: each of its {} rows from line {} on has its own name \
+                 in the first column; expected rows of numbers, one per sample",
                 rows.len(),
                 head.number(table.first)
             ),
@@ -56,8 +56,8 @@ pub fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
         return Err(Failure::failed(
             ErrorCode::NotARecording,
             format_args!(
-                "the file is a list of settings or results, not a recording: {texts} of the {} columns \
-             from line {} on hold texts; expected rows of numbers, one row for each moment",
+                "the file is a list of settings or results, not a recording: {texts} of the {} columns from line {} on \
+                 contain text; expected rows of numbers, one per sample",
                 table.width,
                 head.number(table.first)
             ),
@@ -91,7 +91,7 @@ pub fn refuse_variables(head: &Head, table: &Table, kinds: &[ColumnKind]) -> Res
             ErrorCode::NotARecording,
             format_args!(
                 "the rows name {count} variables in turn, first \"{first}\", each with a value at the same time; \
-                 expected a column for each variable: write the file anew that way"
+                 expected a column for each variable: rewrite the file that way"
             ),
         )
         .line(head.number(table.first))),

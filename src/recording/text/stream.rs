@@ -206,7 +206,7 @@ impl ChannelPlan {
             ),
             Some("") => self.describe_empty(column, name),
             Some(text) if is_instruments_mark(text) => format!(
-                "column {column} (\"{name}\") reads \"{text}\", with which instruments mark no value or over range; \
+                "column {column} (\"{name}\") reads \"{text}\", which instruments write for no value or over range; \
                  {BRIDGE}"
             ),
             Some(text) if is_non_finite(text) => format!(

@@ -34,7 +34,7 @@ pub fn leave_out_count(rows: &mut Rows, is_all: bool) -> Option<Warning> {
     rows.drop_first();
     Some(Warning::new(
         "lines-skipped",
-        format!("line {line} says how many rows follow, {below}; it was left out"),
+        format!("line {line} gives the number of rows that follow, {below}; it was skipped"),
     ))
 }
 
@@ -76,8 +76,8 @@ pub fn leave_out(rows: &mut Rows, roles: &[Role]) -> Option<Warning> {
     Some(Warning::new(
         "lines-skipped",
         format!(
-            "{} left out below the last time stamp, from line {line} on: no time stamp, like sums and means below \
-             a table",
+            "{} skipped below the last time stamp, from line {line} on: no time stamp, like sums and means below a \
+             table",
             plural(behind, "row")
         ),
     ))

@@ -61,7 +61,7 @@ pub fn refine_fundamental(
         if (frequency_hz / start_hz - 1.0).abs() > span {
             return Err(Error::NotRefined {
                 start_hz,
-                why: "no clear maximum within the span searched",
+                why: "no clear maximum within the search span",
             });
         }
         if length == count {
@@ -149,7 +149,7 @@ impl Settled {
         }
         Err(Error::NotRefined {
             start_hz,
-            why: "the steps of the fit do not settle",
+            why: "the fit does not converge",
         })
     }
 

@@ -66,7 +66,7 @@ pub struct Event {
     /// Index of the stamp that ends it.
     #[serde(skip)]
     pub index: usize,
-    /// The stamp before it, in s.
+    /// Previous stamp, in s.
     #[serde(rename = "after_s")]
     pub from_s: f64,
     /// Its length in s; negative if time runs backwards.

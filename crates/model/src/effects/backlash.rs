@@ -24,17 +24,16 @@ const SOFT_GAPS: &[&[f64]] = &[&[0.01, 0.4], &[0.05, 0.4], &[0.3, 0.4]];
 pub(super) static EFFECT: Effect = Effect {
     name: "backlash",
     equation: "n = -clamp(x, -g, g)",
-    meaning: "The beam is not touched while the stator moves within a gap, so the record misses what happens \
-              there.",
+    meaning: "The stator moves within a gap without loading the beam, so the record misses what happens there.",
     remedy: "Tighten or preload the joint between stator and beam, or keep it closed with a steady torque.",
     source: "M. Nordin, P.-O. Gutman, Automatica 38 (2002), 1633",
     validity: "for stiff flanks without impact losses",
     mistaken_for: &["coulomb-friction", "bouc-wen-hysteresis", "cubic-stiffness"],
-    experiment: "a slow load and unload through zero, and the response with a preload",
+    experiment: "slow loading and unloading through zero, and the response with a preload",
     forms: &[
         Form {
             name: "gap",
-            law: "n = -clamp(x, -g, g): between -g and g the beam is not touched, and the gage shows nothing",
+            law: "n = -clamp(x, -g, g): between -g and g the beam is not loaded, and the gage reads zero",
             stage: Stage::Stand,
             parameters: &[GAP],
             starts: GAPS,
@@ -42,7 +41,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "gap-beside",
-            law: "n = -clamp(x, -g, g), and the gage follows the displacement all the same",
+            law: "n = -clamp(x, -g, g), but the gage follows the displacement",
             stage: Stage::Stand,
             parameters: &[GAP],
             starts: GAPS,
@@ -50,7 +49,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "soft-gap",
-            law: "n = -r clamp(x, -g, g): something softer carries within the gap",
+            law: "n = -r clamp(x, -g, g): a softer spring acts within the gap",
             stage: Stage::Stand,
             parameters: &[SMALL_GAP, SOFTENING],
             starts: SOFT_GAPS,
@@ -58,7 +57,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "soft-gap-beside",
-            law: "n = -r clamp(x, -g, g), and the gage follows the displacement all the same",
+            law: "n = -r clamp(x, -g, g), but the gage follows the displacement",
             stage: Stage::Stand,
             parameters: &[SMALL_GAP, SOFTENING],
             starts: SOFT_GAPS,
@@ -66,7 +65,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "joint",
-            law: "n = w - x, w dragged along at a distance of at most g: the beam follows the stator with play",
+            law: "n = w - x, w dragged along within g of x: the beam follows the stator with play",
             stage: Stage::Stand,
             parameters: &[GAP],
             starts: &[&[0.02], &[0.1]],
@@ -74,7 +73,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "recorded",
-            law: "y = w, w dragged along at a distance of at most g: play in what moves the gage only",
+            law: "y = w, w dragged along within g of x: play only in the drive of the gage",
             stage: Stage::Gage,
             parameters: &[GAP],
             starts: &[&[0.02], &[0.1]],
@@ -149,7 +148,7 @@ impl Distortion for Play {
 
     fn inverse(&self, _: SampleClock, noise_std: f64, samples: &mut [f64]) -> Unrecovered {
         Unrecovered {
-            why: "the gage stands still while the play is gone through".to_owned(),
+            why: "the gage does not move while the play is taken up".to_owned(),
             samples: without_play(samples, self.gap, noise_std),
         }
     }

@@ -33,13 +33,12 @@ const STARTS: &[&[f64]] = &[
 pub(super) static EFFECT: Effect = Effect {
     name: "bouc-wen-hysteresis",
     equation: "n = k z, z' = x' - b |x'| z - c x' |z|",
-    meaning: "A joint or clamp slips a little each time the motion turns, and its torque depends on where the \
-              motion came from.",
+    meaning: "A joint or clamp slips slightly at each reversal, and its torque depends on the history of the motion.",
     remedy: "Clean and tighten clamps and bolts, or weld or glue the joint that slips.",
     source: "Y. K. Wen, J. Eng. Mech. Div. 102 (1976), 249",
-    validity: "without drift of the loops",
+    validity: "for loops that do not drift",
     mistaken_for: &["coulomb-friction", "backlash", "structural-damping"],
-    experiment: "a slow load and unload with inner loops, at two rates",
+    experiment: "slow loading and unloading with inner loops, at two rates",
     forms: &[
         Form {
             name: "linear",

@@ -13,14 +13,13 @@ use std::f64::consts::TAU;
 pub(super) static EFFECT: Effect = Effect {
     name: "capacitive-coupling",
     equation: "y = x + G tau u'",
-    meaning: "A stray capacitance lets the slope of the load into the record, or a capacitor in series blocks \
-              what is slow.",
-    remedy: "Shield the gage's cable, keep it away from the supply of the motor, and set the recorder's input to \
-              DC.",
+    meaning: "A stray capacitance couples the slope of the load into the record, or a series capacitor blocks low \
+        frequencies.",
+    remedy: "Shield the gage's cable, keep it away from the motor supply, and set the recorder's input to DC.",
     source: "T. P. Hertel's thesis, section III",
     validity: "far below the corner of the stray path",
     mistaken_for: &["second-mode", "time-delay"],
-    experiment: "the same excitation with the gage's supply off: what is left is coupled",
+    experiment: "the same excitation with the gage's supply off: any remaining signal is coupled",
     forms: &[
         Form {
             name: "slope-of-load",

@@ -15,18 +15,18 @@ use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 pub(super) static EFFECT: Effect = Effect {
     name: "coulomb-friction",
     equation: "n = F sgn(x'), or F tanh(x'/v)",
-    meaning: "Dry friction takes a torque of constant size against the motion, so small motions are damped more \
-              than large ones.",
-    remedy: "Find the contact that rubs (bearing, seal, cable, dirt in a gap), and free or lubricate it.",
+    meaning: "Dry friction opposes the motion with a constant torque, so small motions are damped more than large \
+        ones.",
+    remedy: "Find the rubbing contact (bearing, seal, cable, dirt in a gap), and free or lubricate it.",
     source: "C. A. Coulomb, Theorie des machines simples (1781)",
-    validity: "where sliding is full",
+    validity: "for gross sliding",
     mistaken_for: &[
         "stribeck-friction",
         "bouc-wen-hysteresis",
         "quadratic-damping",
         "structural-damping",
     ],
-    experiment: "a slow load and unload, a free decay down to rest, and the response at two levels",
+    experiment: "slow loading and unloading, a free decay to rest, and the response at two levels",
     forms: &[
         Form {
             name: "sharp",

@@ -17,12 +17,11 @@ pub(super) static EFFECT: Effect = Effect {
     equation: "n = c x^3",
     meaning: "The stiffness changes with the square of the displacement, so the natural frequency changes with \
               the level.",
-    remedy: "Stay at levels where the term is small, and check the clamping of the beam for edges that come into \
-              contact.",
+    remedy: "Stay at levels where the term is small, and check the beam's clamp for edges that come into contact.",
     source: "G. Duffing, Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz (1918)",
     validity: "while the next odd power is small",
     mistaken_for: &["gage-nonlinearity", "quadratic-stiffness", "backlash"],
-    experiment: "a slow load and unload up to the largest load, and the response at two levels",
+    experiment: "slow loading and unloading up to the largest load, and the response at two levels",
     forms: &[
         Form {
             name: "beside",

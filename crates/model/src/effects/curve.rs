@@ -58,7 +58,7 @@ where
         }
         Unrecovered {
             why: format!(
-                "beyond {:.4} to {:.4} of the record in SI units the curve cannot be inverted",
+                "the curve cannot be inverted beyond {:.4} to {:.4} of the record in SI units",
                 ends[0], ends[1]
             ),
             samples: beyond,

@@ -29,13 +29,13 @@ const ONE_DAMPED: &[&[f64]] = &[&[0.3, 0.5, 0.1], &[1.0, 0.8, 0.1], &[10.0, 0.85
 pub(super) static EFFECT: Effect = Effect {
     name: "end-stop",
     equation: "n = k (x - clamp(x, -g, g))",
-    meaning: "Beyond some displacement something else carries too, such as a stop that the beam touches.",
+    meaning: "Beyond some displacement another part shares the load, such as a stop that the beam touches.",
     remedy: "Find what the beam touches and move it away, or stay below that displacement.",
     source: "S. W. Shaw, P. J. Holmes, J. Sound Vib. 90 (1983), 129",
-    validity: "for a contact that stays where it is",
+    validity: "for a contact that does not move",
     mistaken_for: &["cubic-stiffness", "saturation", "bouc-wen-hysteresis"],
-    experiment: "a slow load and unload to both sides, past the displacement at which the stop sets in, and the response \
-                 at a level that does not reach it",
+    experiment: "slow loading and unloading in both directions, past the displacement where the stop engages, and the \
+        response at a level that does not reach it",
     forms: &[
         Form {
             name: "both",

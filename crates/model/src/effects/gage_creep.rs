@@ -14,12 +14,12 @@ use super::{Action, Effect, EffectParameter, Form, Stage};
 pub(super) static EFFECT: Effect = Effect {
     name: "gage-creep",
     equation: "y = x + c/(1 + s tau) x",
-    meaning: "The gage or its bond creeps: after a change of the load the record goes on moving for a while.",
-    remedy: "Use a gage whose creep is matched to the beam, cure the bond again, or read at a fixed time after loading.",
+    meaning: "The gage or its bond creeps: after a change of load the record keeps changing for a while.",
+    remedy: "Use a gage with creep matched to the beam, cure the bond again, or read at a fixed time after loading.",
     source: "K. Hoffmann, An Introduction to Measurements using Strain Gages (HBM, 1989), 3.4",
     validity: "at one temperature",
     mistaken_for: &["thermal-drift", "capacitive-coupling"],
-    experiment: "a known load put on, held for some time constants and taken off",
+    experiment: "a known load applied, held for several time constants and removed",
     forms: &[Form {
         name: "lag",
         law: "y = x + c/(1 + s tau) x, tau = 1/(2 pi corner)",

@@ -1,8 +1,8 @@
 //! A gage or bridge whose output is not proportional to strain.
 //!
-//! `y = x + a x²` (`square`, the law of a silicon gage, Appendix B of the thesis:
-//! `ΔR/R = GF (T₀/T) ε + C₂ (T₀/T)² ε²`), `y = x + b x³` (`cube`) or both (`both`). **Valid while the curve rises.**
-//! Mistaken for `quadratic-stiffness` or `cubic-stiffness`, which change the motion too, and for `saturation`.
+//! `y = x + a x²` (`square`, the law of a silicon gage, Appendix B of the thesis: `ΔR/R = GF (T₀/T) ε + C₂ (T₀/T)²
+//! ε²`), `y = x + b x³` (`cube`) or both (`both`). **Valid while the curve is rising.** Mistaken for
+//! `quadratic-stiffness` or `cubic-stiffness`, which change the motion too, and for `saturation`.
 
 use super::curve::curve;
 use super::{Action, Effect, EffectParameter, Form, Stage};
@@ -17,9 +17,9 @@ pub(super) static EFFECT: Effect = Effect {
     remedy: "Calibrate with known static loads over the whole range, and use less strain, a full bridge or metal \
               gages.",
     source: "T. P. Hertel's thesis, Appendix B",
-    validity: "while the curve rises",
+    validity: "while the curve is rising",
     mistaken_for: &["quadratic-stiffness", "cubic-stiffness", "saturation"],
-    experiment: "known static loads over the whole range, to both sides",
+    experiment: "known static loads over the whole range, in both directions",
     forms: &[
         Form {
             name: "square",

@@ -10,11 +10,11 @@ use num_complex::Complex64;
 pub(super) static EFFECT: Effect = Effect {
     name: "gain-error",
     equation: "y = (1 + e) x",
-    meaning: "The whole record is too large or too small by one factor.",
+    meaning: "The whole record is too large or too small by a constant factor.",
     remedy: "Calibrate again with a known static load, and check gage factor, bridge supply and gain in the \
               stand file.",
     source: "the definition",
-    validity: "at all levels and frequencies alike",
+    validity: "for a factor independent of level and frequency",
     mistaken_for: &["second-mode"],
     experiment: "a known static load",
     forms: &[Form {

@@ -34,9 +34,9 @@ pub(super) static EFFECT: Effect = Effect {
     meaning: "The mains add a line at their frequency, and often at its multiples, to the record.",
     remedy: "Shield the gage's cable, keep it away from power cables, and ground the stand at one point only.",
     source: "the definition",
-    validity: "for a steady grid",
+    validity: "for a constant mains frequency",
     mistaken_for: &["rotor-imbalance"],
-    experiment: "a record with the motor off, or at another speed: the mains stay",
+    experiment: "a record with the motor off, or at another speed: the mains lines stay",
     forms: &[
         form!("60-Hz", 60.0, "amplitude"),
         form!("50-Hz", 50.0, "amplitude"),

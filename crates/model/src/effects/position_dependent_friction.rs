@@ -19,17 +19,17 @@ const TRANSITION_SPEED: EffectParameter =
 pub(super) static EFFECT: Effect = Effect {
     name: "position-dependent-friction",
     equation: "n = F exp(-((x - c)/w)^2) tanh(x'/v), or mu |x - c| tanh(x'/v)",
-    meaning: "Friction acts at some displacements more than at others, as of a spot that rubs or of a wedge.",
-    remedy: "Find where parts touch at the displacement that is named, and clear that place or align the parts.",
+    meaning: "Friction is higher at some displacements than at others, as from a rubbing spot or a wedge.",
+    remedy: "Find where parts touch at the displacement named, and clear that place or align the parts.",
     source: "B. Armstrong-Helouvry et al., Automatica 30 (1994), 1083",
-    validity: "where sliding is full",
+    validity: "for gross sliding",
     mistaken_for: &[
         "coulomb-friction",
         "stribeck-friction",
         "structural-damping",
         "bouc-wen-hysteresis",
     ],
-    experiment: "a slow load and unload over the whole range, and the response with and without a preload",
+    experiment: "slow loading and unloading over the whole range, and the response with and without a preload",
     forms: &[
         Form {
             name: "spot",

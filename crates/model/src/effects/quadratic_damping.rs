@@ -11,8 +11,8 @@ use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 pub(super) static EFFECT: Effect = Effect {
     name: "quadratic-damping",
     equation: "n = d x' |x'|",
-    meaning: "The damping grows with the speed, as the drag of turbulent air or oil does.",
-    remedy: "Remove what moves air or oil with the stator, or identify the stand at the level of use.",
+    meaning: "The damping grows with the speed, like the drag of turbulent air or oil.",
+    remedy: "Remove parts that move air or oil with the stator, or identify the stand at the level of use.",
     source: "J. W. Strutt (Rayleigh), The Theory of Sound I (1894), 39",
     validity: "for turbulent flow",
     mistaken_for: &["coulomb-friction", "bouc-wen-hysteresis"],

@@ -10,13 +10,13 @@ use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 pub(super) static EFFECT: Effect = Effect {
     name: "quadratic-stiffness",
     equation: "n = c x^2, or c x |x|",
-    meaning: "The stiffness changes in proportion to the displacement, towards one side as of a bent or preloaded \
-              beam, or towards both.",
-    remedy: "Straighten the beam and take off its preload, or stay at levels where the term is small.",
+    meaning: "The stiffness changes in proportion to the displacement, in one direction as with a bent or preloaded \
+        beam, or in both.",
+    remedy: "Straighten the beam and remove its preload, or stay at levels where the term is small.",
     source: "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (1979), 2.3",
     validity: "while the stiffness stays positive",
     mistaken_for: &["gage-nonlinearity", "cubic-stiffness"],
-    experiment: "a slow load and unload to both sides, and the response at two levels",
+    experiment: "slow loading and unloading in both directions, and the response at two levels",
     forms: &[
         Form {
             name: "even",

@@ -27,13 +27,13 @@ macro_rules! order {
 pub(super) static EFFECT: Effect = Effect {
     name: "recorder-lowpass",
     equation: "L = 1/(1 + j f/f_c), or Butterworth of order 2 to 4",
-    meaning: "A low-pass filter in the amplifier or recorder reduces and delays what is fast.",
+    meaning: "A low-pass filter in the amplifier or recorder attenuates and delays high frequencies.",
     remedy: "Raise its corner frequency or switch it off, or declare it as low_pass in [recorder] of the stand \
               file.",
     source: "S. Butterworth, Exp. Wireless 7 (1930), 536",
     validity: "below half the sampling rate",
     mistaken_for: &["time-delay", "second-mode"],
-    experiment: "one signal on both channels at once, with energy around the corner",
+    experiment: "the same signal on both channels, with energy around the corner frequency",
     forms: &[
         order!(1, "order-1", "L = 1/(1 + j f/f_c), an RC low-pass"),
         order!(2, "order-2", "Butterworth of order 2"),

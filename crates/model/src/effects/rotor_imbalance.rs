@@ -11,9 +11,9 @@ use super::{Action, Effect, EffectParameter, Form, ParameterScale, Stage};
 pub(super) static EFFECT: Effect = Effect {
     name: "rotor-imbalance",
     equation: "y = x + a sin(2 pi f t + phase)",
-    meaning: "An unbalanced or misaligned rotor adds a torque once or twice a turn.",
-    remedy: "Balance the rotor and align its coupling, or choose a speed whose line is away from what is \
-              measured.",
+    meaning: "An unbalanced or misaligned rotor adds a torque once or twice per revolution.",
+    remedy: "Balance the rotor and align its coupling, or choose a speed whose line is away from the frequencies of \
+        interest.",
     source: "T. P. Hertel's thesis, section III",
     validity: "for a constant speed",
     mistaken_for: &["mains-pickup"],

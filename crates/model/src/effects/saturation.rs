@@ -20,12 +20,12 @@ const FAR_LIMIT: EffectParameter =
 pub(super) static EFFECT: Effect = Effect {
     name: "saturation",
     equation: "y = clamp(x, -L, L), or L tanh(x/L)",
-    meaning: "The recorder or amplifier reaches the end of its range and cuts the signal off.",
-    remedy: "Record again with a lower gain or a wider range: what is cut off cannot be recovered.",
+    meaning: "The recorder or amplifier reaches the end of its range and clips the signal.",
+    remedy: "Record again with a lower gain or a wider range: the clipped part cannot be recovered.",
     source: "the definition",
-    validity: "for a range that is the same to both sides",
+    validity: "for a range that is the same in both directions",
     mistaken_for: &["gage-nonlinearity", "cubic-stiffness"],
-    experiment: "the same excitation at a lower level or a lower gain of the recorder",
+    experiment: "the same excitation at a lower level or a lower recorder gain",
     forms: &[
         Form {
             name: "hard",
@@ -133,7 +133,7 @@ impl Distortion for Clipping {
         let places = samples.iter().enumerate().filter(|(_, y)| lost(y));
         Unrecovered {
             why: format!(
-                "at the limits {:.4} and {:.4} of the record in SI units it holds no more than that",
+                "at the limits {:.4} and {:.4} in SI units the record is clipped",
                 limits[0], limits[1]
             ),
             samples: places.map(|(i, _)| i).collect(),

@@ -2,7 +2,7 @@
 //!
 //! `coupled`: a second inertia hangs on the first one. `H = H₁ + a H₂` (`added`), `(1 − a) H₁ + a H₂` (`shared`, the static gain stays), `H₁ H₂` (`series`), or
 //! `g H₁ + (a + b s/ω₂) H₂` (`free`), with `H_i = ω_i²/(s² + 2ζ_i ω_i s + ω_i²)`. D. J. Ewins, *Modal Testing* (2000), 2.
-//! **Valid for modes apart by more than their widths.** Mistaken for `recorder-lowpass` or `time-delay` if it lies
+//! **Valid for modes separated by more than their widths.** Mistaken for `recorder-lowpass` or `time-delay` if it lies
 //! above the excitation.
 
 use super::{Action, Effect, EffectParameter, Form, Mode, Stage};
@@ -40,14 +40,14 @@ macro_rules! starts {
 pub(super) static EFFECT: Effect = Effect {
     name: "second-mode",
     equation: "H = H1 + a H2",
-    meaning: "Another resonance of the stand lies in or near the band, so one inertia and one spring do not \
-              describe the response.",
-    remedy: "Stiffen the part that moves in it, or identify the stand with excitation up to well above that \
-              resonance.",
+    meaning: "Another resonance of the stand lies in or near the band, so a single inertia and spring do not describe \
+        the response.",
+    remedy: "Stiffen the part that moves in that mode, or identify the stand with excitation to well above that \
+        resonance.",
     source: "D. J. Ewins, Modal Testing (2000), 2",
-    validity: "for modes apart by more than their widths",
+    validity: "for modes separated by more than their widths",
     mistaken_for: &["recorder-lowpass", "time-delay", "gain-error"],
-    experiment: "excitation up to well above the second resonance",
+    experiment: "excitation to well above the second resonance",
     forms: &[
         Form {
             name: "added",
@@ -92,7 +92,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "coupled",
-            law: "a second inertia, mu times the first, hangs on it by a spring and a damper",
+            law: "a second inertia, mu times the first, coupled to it by a spring and a damper",
             stage: Stage::Dynamics,
             parameters: &[
                 FREQUENCY,

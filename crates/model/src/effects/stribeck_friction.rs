@@ -22,9 +22,9 @@ const STRIBECK_SPEED: EffectParameter = EffectParameter::motion("stribeck_speed"
 pub(super) static EFFECT: Effect = Effect {
     name: "stribeck-friction",
     equation: "n = F (1 - d (1 - exp(-(x'/v_s)^2))) sgn(x')",
-    meaning: "Friction is largest at rest and falls once the contact slides, so slow motion can stick and jerk.",
-    remedy: "Find the contact that rubs (bearing, seal, cable), and lubricate or free it, or stay away from turning \
-             points at low speed.",
+    meaning: "Friction is highest at rest and drops once the contact slides, so slow motion can stick and slip.",
+    remedy: "Find the rubbing contact (bearing, seal, cable), and lubricate or free it, or avoid reversals at low \
+        speed.",
     source: "R. Stribeck, Z. VDI 46 (1902), 1341; C. Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995), 419",
     validity: "for steady lubrication",
     mistaken_for: &[
@@ -32,7 +32,7 @@ pub(super) static EFFECT: Effect = Effect {
         "bouc-wen-hysteresis",
         "quadratic-damping",
     ],
-    experiment: "the response at two levels, one of them so low that the stand nearly sticks, and a free decay down to rest",
+    experiment: "the response at two levels, one of them so low that the stand nearly sticks, and a free decay to rest",
     forms: &[
         Form {
             name: "sharp",

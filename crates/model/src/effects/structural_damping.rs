@@ -12,12 +12,12 @@ pub(super) static EFFECT: Effect = Effect {
     name: "structural-damping",
     equation: "K (1 + j eta)",
     meaning: "The material and its joints lose energy in proportion to the displacement, not to the speed.",
-    remedy: "Nothing at the stand needs mending: keep the effect in the stand file, and measure it with steady \
-              lines over the whole band.",
+    remedy: "The stand needs no repair: keep the effect in the stand file, and measure it with steady sines over the \
+        whole band.",
     source: "T. Theodorsen, I. E. Garrick, NACA Report 685 (1940)",
     validity: "for steady vibration",
     mistaken_for: &["coulomb-friction", "bouc-wen-hysteresis", "time-delay"],
-    experiment: "steady lines from far below to far above the natural frequency",
+    experiment: "steady sines from far below to far above the natural frequency",
     forms: &[
         Form {
             name: "loss-factor",

@@ -19,12 +19,12 @@ const HALF_WAVES: usize = 8;
 pub(super) static EFFECT: Effect = Effect {
     name: "thermal-drift",
     equation: "y = x + d t, or x + D (1 - e^(-t/tau)), or (1 + g t) x",
-    meaning: "Zero or sensitivity changes while gage, bridge or amplifier warm up.",
-    remedy: "Let everything warm up before the record, use a full bridge, and record the zero before and after.",
+    meaning: "Zero or sensitivity drifts while gage, bridge or amplifier warm up.",
+    remedy: "Let everything warm up before recording, use a full bridge, and record the zero before and after.",
     source: "T. P. Hertel's thesis, Appendix B",
-    validity: "over one warm-up",
+    validity: "during a single warm-up",
     mistaken_for: &["capacitive-coupling"],
-    experiment: "a record at constant load over several times the length",
+    experiment: "a record at constant load, several times as long",
     forms: &[
         Form {
             name: "linear",
@@ -66,7 +66,7 @@ pub(super) static EFFECT: Effect = Effect {
         },
         Form {
             name: "course",
-            law: "y = x + any slow course, of up to eight half waves over the record",
+            law: "y = x + any slow drift, of up to eight half waves over the record",
             stage: Stage::Disturbance,
             parameters: &[],
             starts: &[&[]],

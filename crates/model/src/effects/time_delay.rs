@@ -10,12 +10,12 @@ pub(super) static EFFECT: Effect = Effect {
     name: "time-delay",
     equation: "y(t) = x(t - tau)",
     meaning: "The measured channel lags behind the applied one by a constant time.",
-    remedy: "Record both channels with one clock and the same filters, or declare the lag as delay in [recorder] \
-              of the stand file.",
+    remedy: "Record both channels with one clock and the same filters, or declare the lag as delay in [recorder] of \
+        the stand file.",
     source: "the definition",
     validity: "if both channels share one clock",
     mistaken_for: &["recorder-lowpass", "structural-damping"],
-    experiment: "one signal on both channels at once, with energy at high frequencies",
+    experiment: "the same signal on both channels, with energy at high frequencies",
     forms: &[Form {
         name: "lag",
         law: "y(t) = x(t - tau)",

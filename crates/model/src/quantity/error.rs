@@ -158,6 +158,6 @@ pub enum QuantityError {
 fn hint(nearest: Option<&'static str>) -> String {
     match nearest {
         Some(unit) => format!("; did you mean \"{unit}\"?"),
-        None => "; docs/stand-file.md lists the units that are known".to_owned(),
+        None => "; docs/stand-file.md lists the known units".to_owned(),
     }
 }

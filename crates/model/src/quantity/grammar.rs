@@ -178,7 +178,12 @@ impl<'a> Lexer<'a> {
                 '1' if !self.rest[1..].starts_with(|c: char| c.is_ascii_digit()) => {
                     self.sign(Token::One)
                 }
-                '0'..='9' => return Err(syntax(self.text, "a unit may hold no number but 1")),
+                '0'..='9' => {
+                    return Err(syntax(
+                        self.text,
+                        "a unit may contain no number other than 1",
+                    ));
+                }
                 _ => self.symbol()?,
             };
             tokens.push(token);
@@ -326,7 +331,7 @@ impl Parser<'_> {
             let operator = match self.peek() {
                 None | Some(Token::Close) if !first => return Ok(unit),
                 Some(Token::Times) if first => {
-                    return Err(syntax(self.text, "a product has nothing before its sign"));
+                    return Err(syntax(self.text, "a product has no left operand"));
                 }
                 Some(operator @ (Token::Times | Token::Per)) => {
                     self.next += 1;
@@ -362,7 +367,7 @@ impl Parser<'_> {
             Some(Token::Open) if depth < MAX_DEPTH => self.group(depth)?,
             Some(Token::Open) => return Err(syntax(self.text, "parentheses nest too deep")),
             Some(Token::Power(_)) => {
-                return Err(syntax(self.text, "a power has nothing to raise"));
+                return Err(syntax(self.text, "a power has no base"));
             }
             Some(Token::Times | Token::Per) => {
                 return Err(syntax(self.text, "two operators follow each other"));

@@ -35,12 +35,11 @@ impl fmt::Display for NoSteadyAnswer {
             ),
             Self::Wanders => write!(
                 f,
-                "the motion has not settled after {MOST_REPETITIONS} repetitions of the input: it decays too slowly for so \
-                 short a period, or repeats with another one; simulate several periods at once"
+                "no steady state after {MOST_REPETITIONS} repetitions of the input: the motion decays too slowly for \
+                 so short a period, or repeats with a different one; simulate several periods at once"
             ),
             Self::Drifts => f.write_str(
-                "the stand has an effect that changes with the time since the record began, such as a drift: there is no \
-                 steady answer",
+                "the stand has an effect that changes with time, such as a drift: there is no steady state",
             ),
         }
     }

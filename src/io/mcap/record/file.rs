@@ -137,11 +137,10 @@ impl fmt::Display for Loss {
         match self {
             Self::Truncated { at, what } => write!(
                 f,
-                "the file ends {what}, without its end record; what is whole up to byte {at} was \
-                 read"
+                "the file ends {what}, without its end record; everything complete up to byte {at} was read"
             ),
             Self::Chunk { at, why, span_ns } => {
-                write!(f, "the chunk at byte {at} was left out: {why}")?;
+                write!(f, "the chunk at byte {at} was skipped: {why}")?;
                 match span_ns {
                     Some((start, end)) => {
                         write!(f, " (log times {start} ns to {end} ns)")
@@ -151,13 +150,12 @@ impl fmt::Display for Loss {
             }
             Self::Overrun { at } => write!(
                 f,
-                "a record in the chunk at byte {at} runs past the end of the chunk; the rest of \
-                 the chunk was left out"
+                "a record in the chunk at byte {at} runs past the end of the chunk; the rest of the chunk was skipped"
             ),
             Self::TooLong { at, op, length } => {
                 let rest = match *length > LONGEST {
-                    true => "more than any record; nothing behind it could be read",
-                    false => "and was left out; --longest-metadata reads longer ones",
+                    true => "more than any record; nothing after it could be read",
+                    false => "and was skipped; --longest-metadata reads longer ones",
                 };
                 write!(
                     f,
@@ -179,12 +177,12 @@ impl Loss {
                 is_nested: false,
             } => write!(
                 f,
-                "the record at byte {at} has the opcode 0x{op:02x}, which is not defined: what it held is lost"
+                "the record at byte {at} has the opcode 0x{op:02x}, which is not defined: its content is lost"
             ),
             Self::Unknown { at, op, .. } => write!(
                 f,
-                "a record in the chunk at byte {at} has the opcode 0x{op:02x}, which none in a chunk may have: what \
-                 it held is lost"
+                "a record in the chunk at byte {at} has the opcode 0x{op:02x}, which is not allowed in a chunk: its \
+                 content is lost"
             ),
             Self::Unreadable { at, op } => write!(
                 f,
@@ -196,7 +194,7 @@ impl Loss {
             ),
             Self::EarlyEnd { at } => write!(
                 f,
-                "the end record at byte {at} does not end the file: it was passed over"
+                "the end record at byte {at} does not end the file: it was ignored"
             ),
             Self::Checksum { told, found } => write!(
                 f,
@@ -204,11 +202,11 @@ impl Loss {
             ),
             Self::Undeclared { messages } => write!(
                 f,
-                "messages of channels that are not declared before them, left out: {messages}"
+                "messages of channels not declared before them, skipped: {messages}"
             ),
             Self::MissingChunks { at, chunks } => write!(
                 f,
-                "chunks that the file's index gives and that are not there: {chunks}, the first at byte {at}"
+                "chunks listed in the file's index but missing: {chunks}, the first at byte {at}"
             ),
             Self::Count { what, told, found } => {
                 write!(f, "the file counts {told} {what}, {found} were found")

@@ -198,14 +198,15 @@ fn doubts(object: &TdmsObject, name: &str) -> Option<Warning> {
         "wf_increment" => Some(Warning::new(
             "no-time-axis",
             format!(
-                "\"{name}\": wf_increment changes within the file: the samples have no rate; save each part in a file of its own"
+                "\"{name}\": wf_increment changes within the file: the samples have no rate; save each part in a \
+                separate file"
             ),
         )),
         changed => Some(Warning::new(
             "restarted",
             format!(
-                "\"{name}\": {changed} changes within the file: the recording was restarted, and the samples lie as if it had not \
-                 been; save each part in a file of its own if the times matter"
+                "\"{name}\": {changed} changes within the file: the recording was restarted, but the samples are timed \
+                 as if it had not been; save each part in a separate file if the times matter"
             ),
         )),
     }

@@ -18,8 +18,8 @@ impl Sources<'_> {
         Some(Warning::new(
             "time-falls",
             format!(
-                "\"{}\" is named as time but falls too often to be that: it was taken for a channel; \
-                 choose the time with --time-column, or give --rate HZ",
+                "\"{}\" is named like time but decreases too often to be time: it was read as a channel; choose the \
+                 time with --time-column, or give --rate HZ",
                 self.fields[*place].heading
             ),
         ))
@@ -46,8 +46,8 @@ impl Sources<'_> {
             Warning::new(
                 "time-left-out",
                 format!(
-                    "\"{}\" is named as time but does not run as the time of the rows does; it was \
-                     left out (another time is chosen with --time-column)",
+                    "\"{}\" is named like time but disagrees with the time of the rows; it was ignored (choose another \
+                     time with --time-column)",
                     self.fields[*place].heading
                 ),
             )

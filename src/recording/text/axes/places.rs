@@ -203,7 +203,7 @@ impl Sources<'_> {
             return TimePlaces::sure(Vec::new());
         }
         let assumed = format!(
-            "column {} has no heading but rises steadily: it was taken for the time",
+            "column {} has no heading but rises steadily: it was assumed to be the time",
             first + 1
         );
         // Each channel may be preceded by the same time.

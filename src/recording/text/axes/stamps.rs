@@ -341,7 +341,7 @@ impl Sources<'_> {
         }
         if are_days(values) {
             let assumed = format!(
-                "\"{}\" gives no unit: by its size and its steps it was taken for a date in days",
+                "\"{}\" gives no unit: from its size and its steps it was assumed to be a date in days",
                 field.heading
             );
             return (86_400.0, Some(assumed));

@@ -48,15 +48,15 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
     }
     recording.warnings.extend(warning(&scaled, |names| {
         format!(
-            "{names}: the file holds steps of the screen; they were scaled with 25 steps to a division \
-             and the \"Vertical Scale\" of the head"
+            "{names}: the file contains steps of the screen; they were scaled with 25 steps per division and the \
+             \"Vertical Scale\" of the header"
         )
     }));
     recording.warnings.extend(warning(&bare, |names| {
         format!(
-            "{names}: the file holds steps of the screen, not the unit in its head, and \"Vertical \
-             Scale\", \"Vertical Position\" and \"Probe\" do not settle what a step is; save it in \
-             the mode Detail, or scale it yourself"
+            "{names}: the file contains steps of the screen, not the unit in its header, and \"Vertical Scale\", \
+             \"Vertical Position\" and \"Probe\" do not determine the size of a step; save it in the mode Detail, or \
+             scale it yourself"
         )
     }));
     recording.details = details;

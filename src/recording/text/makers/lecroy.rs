@@ -43,7 +43,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
     if there < said {
         recording.lost = Some(Warning::new(
             "samples-missing",
-            format!("the head announces {said} samples, but there are {there}"),
+            format!("the header gives {said} samples, but there are {there}"),
         ));
     } else {
         // These files end without a line end, and everything announced is there.

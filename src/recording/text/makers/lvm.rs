@@ -380,7 +380,7 @@ fn missing(header: &Header, place: usize, field: &Field, column: &Column) -> Opt
         Warning::new(
             "samples-missing",
             format!(
-                "channel \"{}\": the header announces {said} samples, but there are {}",
+                "channel \"{}\": the header gives {said} samples, but there are {}",
                 field.name,
                 column.values.len()
             ),

@@ -81,7 +81,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
         Warning::new(
             "samples-missing",
             format!(
-                "the head announces {} samples, but there are {found}",
+                "the header gives {} samples, but there are {found}",
                 start.count
             ),
         )

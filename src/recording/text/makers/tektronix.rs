@@ -104,7 +104,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
             recording.lost = Some(Warning::new(
                 "samples-missing",
                 format!(
-                    "the head announces {said} samples, but there are {}",
+                    "the header gives {said} samples, but there are {}",
                     column.values.len()
                 ),
             ));

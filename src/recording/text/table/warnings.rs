@@ -37,7 +37,7 @@ impl Layout {
             Warning::new(
                 "sample-count",
                 format!(
-                    "the head says \"{}\" {said}, but there are {rows} rows",
+                    "the header gives \"{}\" {said}, but there are {rows} rows",
                     entry.key
                 ),
             )
@@ -50,7 +50,7 @@ fn of_lines(notes: &LineNotes, zeros: usize, end: usize) -> Vec<Warning> {
     if zeros > 0 {
         warnings.push(Warning::new(
             "zero-bytes",
-            format!("{} in the text left out", plural(zeros, "zero byte")),
+            format!("{} in the text skipped", plural(zeros, "zero byte")),
         ));
     }
     // A last word such as EOF, after all rows, is not a fault.
@@ -62,7 +62,7 @@ fn of_lines(notes: &LineNotes, zeros: usize, end: usize) -> Vec<Warning> {
         warnings.push(Warning::new(
             "lines-skipped",
             format!(
-                "{} among the rows left out, not rows of numbers; the first is line {line}: \"{text}\"",
+                "{} between the rows skipped, not rows of numbers; the first is line {line}: \"{text}\"",
                 plural(notes.odd_count, "line")
             ),
         ));
@@ -71,7 +71,7 @@ fn of_lines(notes: &LineNotes, zeros: usize, end: usize) -> Vec<Warning> {
         warnings.push(Warning::new(
             "items-move",
             format!(
-                "in {} the items of a list stand in other places than in the first; they were followed by their names",
+                "in {} the items of a list are in a different order from the first; they were tracked by their names",
                 plural(notes.moved, "row")
             ),
         ));
@@ -79,7 +79,9 @@ fn of_lines(notes: &LineNotes, zeros: usize, end: usize) -> Vec<Warning> {
     if let Some(line) = notes.too_wide {
         warnings.push(Warning::new(
             "extra-cells",
-            format!("line {line} has more cells than there are columns; they were left out"),
+            format!(
+                "line {line} has more cells than there are columns; the extra cells were skipped"
+            ),
         ));
     }
     warnings

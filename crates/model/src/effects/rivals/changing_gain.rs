@@ -16,8 +16,8 @@ const RATE: EffectParameter =
 pub(super) static EFFECT: Effect = Effect {
     name: "changing-gain",
     equation: "y = x (1 + a + r t)",
-    meaning: "The sensitivity changes evenly over the record.",
-    remedy: "Let everything warm up before the record, and check the supply of the bridge.",
+    meaning: "The sensitivity changes linearly over the record.",
+    remedy: "Let everything warm up before recording, and check the bridge supply.",
     source: "the definition",
     validity: "for small changes",
     mistaken_for: &["thermal-drift", "second-mode", "recorder-lowpass"],

@@ -12,9 +12,9 @@ pub(super) static EFFECT: Effect = Effect {
     name: "cubic-damping",
     equation: "n = d x'^3",
     meaning: "The damping torque grows with the cube of the speed.",
-    remedy: "Remove what moves air or oil with the stator, or identify the stand at the level of use.",
+    remedy: "Remove parts that move air or oil with the stator, or identify the stand at the level of use.",
     source: "B. Ravindra, A. K. Mallik, J. Sound Vib. 170 (1994), 325",
-    validity: "where viscous and quadratic parts are told apart by level",
+    validity: "where viscous and quadratic parts can be distinguished by level",
     mistaken_for: &["quadratic-damping"],
     experiment: "free decays from three amplitudes, or the response at three levels",
     forms: &[Form {

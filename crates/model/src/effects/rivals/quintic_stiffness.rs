@@ -12,13 +12,13 @@ const STARTS: &[&[f64]] = &[&[1e-3], &[-3e-4]];
 pub(super) static EFFECT: Effect = Effect {
     name: "quintic-stiffness",
     equation: "n = c x^5",
-    meaning: "The restoring torque grows with the fifth power of the displacement, so large motions meet a much \
-              stiffer stand.",
+    meaning: "The restoring torque grows with the fifth power of the displacement, so the stand is much stiffer for \
+        large motions.",
     remedy: "Stay at lower levels, and look for parts that come into contact at large displacements.",
     source: "I. Kovacic, M. J. Brennan (eds.), The Duffing Equation (2011), 1",
     validity: "where the cubic part is small",
     mistaken_for: &["cubic-stiffness", "bouc-wen-hysteresis"],
-    experiment: "a slow load and unload up to the largest load, and the response at three levels",
+    experiment: "slow loading and unloading up to the largest load, and the response at three levels",
     forms: &[
         Form {
             name: "beside",

@@ -10,8 +10,8 @@ use crate::effects::{Action, Effect, EffectParameter, Form, Memory, Stage, Torqu
 pub(super) static EFFECT: Effect = Effect {
     name: "squeezed-damping",
     equation: "n = d x^2 x'",
-    meaning: "The damping grows with the displacement, as of an oil film or a rubber bush that is squeezed.",
-    remedy: "Find the film, seal or bush that is squeezed, and replace it or widen its gap.",
+    meaning: "The damping grows with the displacement, as with a squeezed oil film or rubber bush.",
+    remedy: "Find the squeezed film, seal or bush, and replace it or widen its gap.",
     source: "B. van der Pol, Phil. Mag. 2 (1926), 978",
     validity: "for small changes of the gap",
     mistaken_for: &["quadratic-damping", "bouc-wen-hysteresis"],
