@@ -116,7 +116,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["one-weight", "a single load besides zero does not reveal a nonlinear characteristic", "apply further loads"],
         ["poor-fit", "the model does not explain much of the data", "check the columns; choose another range, band or degree"],
         ["zero-drifts", "the reading without load drifts over the test", "allow a longer warm-up, and read the zero of each record"],
-        ["driven-at-first", "the first part of a decay is not free ringing: a soft push, a hand, or a load that is let go slowly", "hit briefly, or give the free ringing with --range"],
+        ["driven-at-first", "the motion at the start of a decay is still driven: a soft push, a hand, or a load that is let go slowly", "hit briefly, or give the free decay with --range"],
         ["restart-in-decay", "the ringing starts again within a decay", "hit once, and check for lost samples and overload"],
         ["second-stroke", "the hammer struck twice; the recorded force includes both strokes", "repeat the hit if the coherence is low"],
         ["noise-on-force", "noise on the hammer's force signal counts as force, so the response is too small", "use DC coupling for the hammer, or record so that its signal is at rest after the stroke"],

@@ -206,7 +206,7 @@ fn wrong(run: &Run, fault: &str, new: &(Output, Vec<Vec<u8>>)) -> Option<String>
         Some(0) if output.stdout != new.0.stdout => {
             Some("code 0, and standard output differs".to_owned())
         }
-        Some(0) if said.contains("cannot") => Some(format!("code 0, but {said}")),
+        Some(0) if has_failed(&said) => Some(format!("code 0, but {said}")),
         Some(0) => None,
         _ if ending == EINTR || ending == "short" => Some(format!("not repeated: {said}")),
         Some(1) if !is_old && !is_new => Some("neither the old files nor the new ones".to_owned()),
@@ -214,6 +214,12 @@ fn wrong(run: &Run, fault: &str, new: &(Output, Vec<Vec<u8>>)) -> Option<String>
         Some(1) => None,
         code => Some(format!("exit code {code:?}: {said}")),
     }
+}
+
+/// Whether something could not be done, by what was said beside warnings.
+fn has_failed(said: &str) -> bool {
+    let mut lines = said.lines();
+    lines.any(|line| line.contains("cannot") && !line.starts_with("torqcomp: warning"))
 }
 
 /// The indices of the calls that are made to fail, out of `count`.

@@ -18,11 +18,14 @@ fn orders_above_the_band_of_a_compensated_record_are_said() {
     let folder = Folder::new();
     folder.write("in.csv", record(&shown, 20_000.0));
     for (band, said) in [
-        ("300", Some("gone of orders 4, 5, 6, 7, 8 and 9")),
-        ("510", Some("gone of orders 6, 7, 8 and 9")),
-        ("560", Some("gone of orders 6, 7, 8 and 9")),
-        ("587", Some("gone of orders 7, 8 and 9")),
-        ("600", Some("gone of orders 7, 8 and 9")),
+        (
+            "300",
+            Some("removes part or all of orders 4, 5, 6, 7, 8 and 9"),
+        ),
+        ("510", Some("removes part or all of orders 6, 7, 8 and 9")),
+        ("560", Some("removes part or all of orders 6, 7, 8 and 9")),
+        ("587", Some("removes part or all of orders 7, 8 and 9")),
+        ("600", Some("removes part or all of orders 7, 8 and 9")),
         ("1000", None),
     ] {
         let compensate = ["compensate", "in.csv", "--stand", "stand.toml", "-q"];

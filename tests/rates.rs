@@ -88,7 +88,7 @@ fn a_given_rate_does_not_hide_a_gap() {
     assert!(!refused.stderr.contains("--rate"), "{}", refused.stderr);
     let said = [
         "[rate-joins-gaps]",
-        "leave out 0.02 s in 1 gap (about 20 samples)",
+        "skip 0.02 s in 1 gap (about 20 samples)",
         "from 0.499 s to 0.52 s",
     ];
     compensate(&folder, &["--rate", "1000"]).says(0, &said);

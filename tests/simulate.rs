@@ -183,7 +183,13 @@ fn columns_that_the_stand_does_not_take_are_refused() {
         ],
     );
     folder.write("bare.csv", text.replace("applied_n_m", "load"));
-    simulate("bare.csv", &["load"]).says(0, &["[unit-assumed]", "N m was assumed"]);
+    simulate("bare.csv", &["load"]).says(
+        0,
+        &[
+            "[unit-assumed]",
+            "N m, which the stand expects, was assumed",
+        ],
+    );
     simulate("bare.csv", &["load", "--strict"]).says(3, &["[unit-assumed]"]);
     simulate("record.csv", &["applied_n_m", "--json"]).says(2, &["give the record a file with -o"]);
     let kept: Vec<&str> = text

@@ -216,7 +216,7 @@ fn the_heading_of_a_single_column_may_have_spaces() {
 fn cells_with_units_are_refused_with_their_place() {
     let folder = Folder::new();
     folder.write("in.csv", table(|i| format!("{} N m", plain(i))));
-    let remedy = "write that in the heading: \"Torque [N m]\"";
+    let remedy = "put that in the heading: \"Torque [N m]\"";
     folder
         .run(&COMPENSATE)
         .says(1, &["line 2", "column 2", "6.000000 N m", remedy]);

@@ -587,3 +587,46 @@ fn a_hammer_at_an_arm_gives_the_torque_of_a_volt() {
         .run(&wrong)
         .says(2, &["--radius goes with a force", "in V"]);
 }
+
+/// A torque that is put on or taken off, early or late in a record, with noise or without, shows the resonance without a
+/// word on the kind of excitation.
+#[test]
+fn a_torque_that_comes_on_or_off_is_a_transient() {
+    let mut noise = Noise(21);
+    let (omega, damping_ratio) = (TAU * 180.0, 0.015);
+    for (size, early) in [(0.0, true), (0.01, true), (1e-3, false)] {
+        for is_off in [false, true] {
+            let from = if early { 800 } else { 6000 };
+            let (decay, damped) = (damping_ratio * omega, omega * (1.0_f64 - 2.25e-4).sqrt());
+            let step = |k: usize| {
+                let t = (k as f64 - from as f64 + 0.5) / 4000.0;
+                let ringing = (damped * t).cos() + decay / damped * (damped * t).sin();
+                let risen = (1.0 - (-decay * t).exp() * ringing) * f64::from(u8::from(k >= from));
+                if is_off { 1.0 - risen } else { risen }
+            };
+            let on = |k: usize| f64::from(u8::from((k >= from) != is_off));
+            let applied: Vec<f64> = (0..16_000).map(|k| on(k) + size * noise.normal()).collect();
+            let measured: Vec<f64> = (0..16_000)
+                .map(|k| step(k) + 2e-3 * noise.normal())
+                .collect();
+            let record = response::Driven {
+                name: "step",
+                rate_hz: 4000.0,
+                applied: &applied,
+                measured: &measured,
+            };
+            let options = response::ResponseOptions {
+                modes: Some(1),
+                ..response::ResponseOptions::default()
+            };
+            let found = response::identify(&[record], &options).unwrap();
+            let what = format!("noise {size}, from {from}, off {is_off}");
+            let (hz, ratio) = (
+                of(&found, "natural_frequency").value(),
+                of(&found, "damping_ratio").value(),
+            );
+            assert!((hz - 180.0).abs() < 0.5, "{what}: {hz} Hz");
+            assert!((ratio - damping_ratio).abs() < 0.002, "{what}: {ratio}");
+        }
+    }
+}

@@ -18,6 +18,7 @@ use super::{FitQuality, Identification, ModalPole, hum, rms};
 use crate::failure::Failure;
 use crate::warning::Warning;
 
+use anew::Beginning;
 pub use laws::{Law, LawFit, envelope};
 use modes::ModesFit;
 pub use modes::Stretch;
@@ -56,6 +57,15 @@ pub fn identify(
     records: &[Ringing],
     options: &DecayOptions,
 ) -> Result<(Identification, Vec<Stretch>), Failure> {
+    let (result, stretches, _) = evaluated(records, options)?;
+    Ok((result, stretches))
+}
+
+/// The result, with the moments at which decays begin anew.
+fn evaluated(
+    records: &[Ringing],
+    options: &DecayOptions,
+) -> Result<(Identification, Vec<Stretch>, Vec<Beginning>), Failure> {
     let mut result = Identification::new("decay");
     let (mut stretches, mut lines) = stretches::stretches(records, options, &mut result)?;
     let wanted = ModeSearch {
@@ -65,7 +75,9 @@ pub fn identify(
     };
     let found = search::search(&mut stretches, &wanted, &lines)?;
     let (found, beginnings) = anew::cut(found, &mut stretches, (&wanted, &lines))?;
-    present::beginnings(&mut result, &beginnings);
+    let consequences = [stretches::OWN_PARTS, LEFT_OUT];
+    let told = present::beginnings(&beginnings, consequences);
+    result.warnings.extend(told);
     let (fit, has_baseline) = (found.fit, found.has_baseline);
     let more = found.lines;
     lines.extend(more);
@@ -103,7 +115,7 @@ pub fn identify(
     present::poor(&mut result, &fit, &stretches, (order[0], has_baseline));
     by_hand::compare(&mut result, &fit, &stretches, order[0]);
     present::draw(&mut result, &fit, &stretches);
-    Ok((result, stretches))
+    Ok((result, stretches, beginnings))
 }
 
 /// Warns about a record that is not a single free decay after each hit.
@@ -111,12 +123,23 @@ pub fn identify(
 /// # Errors
 /// If there is no decay.
 pub fn check(record: &Ringing) -> Result<Vec<Warning>, Failure> {
-    let (found, _) = identify(std::slice::from_ref(record), &DecayOptions::default())?;
+    let options = DecayOptions::default();
+    let (found, _, beginnings) = evaluated(std::slice::from_ref(record), &options)?;
     let mut doubts: Vec<Warning> = found.warnings;
     doubts.retain(|doubt| doubt.code == "poor-fit");
-    doubts.extend(present::restart(&stretches::restarts_s(record), NOT_ONE));
+    let again = |time_s: f64| Beginning {
+        time_s,
+        rings_before: true,
+    };
+    let restarts = stretches::restarts_s(record).into_iter().map(again);
+    let all: Vec<Beginning> = restarts.chain(beginnings).collect();
+    doubts.extend(present::beginnings(&all, [NOT_ONE, CUT_THERE]));
     Ok(doubts)
 }
+
+/// Consequence of a driven start where it is left out, and where a decay is fitted as a whole.
+const LEFT_OUT: &str = "this part is left out; hit briefly, or give the free decay with --range";
+const CUT_THERE: &str = "cut the record there with --range";
 
 /// Consequence of a restart where a decay is fitted as a whole.
 const NOT_ONE: &str = "a hand or a brake applied to the stand would look the same, and no single initial state \

@@ -2,7 +2,6 @@
 
 use super::anew::Beginning;
 use super::modes::{ModesFit, Stretch};
-use super::stretches::OWN_PARTS;
 use crate::chart::{Chart, Series};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::hum::{SteadyLine, listed};
@@ -81,23 +80,26 @@ pub(super) fn restart(times_s: &[f64], consequence: &str) -> Option<Warning> {
     ))
 }
 
-/// Warns of ringing that begins anew.
-pub(super) fn beginnings(result: &mut Identification, all: &[Beginning]) {
+/// Warnings about decays that begin anew, and what follows from each kind.
+pub(super) fn beginnings(all: &[Beginning], [restarted, driven]: [&str; 2]) -> Vec<Warning> {
     let times = |rings: bool| {
         let of_kind = all.iter().filter(move |b| b.rings_before == rings);
         of_kind.map(|b| b.time_s).collect::<Vec<_>>()
     };
-    result.warnings.extend(restart(&times(true), OWN_PARTS));
-    if let Some(last) = times(false).last() {
-        result.warn(
+    let driven = times(false).last().map(|last_s| {
+        Warning::new(
             "driven-at-first",
             format!(
-                "up to {} s the motion is not the free ringing that follows, but driven by what set it off (a soft push, a \
-                 hand, a load that is let go slowly): it is left out; hit briefly, or give the free ringing with --range",
-                rounded(*last, 5)
+                "up to {} s the motion is not the free decay that follows, but driven (by a soft push, a hand, or a load that \
+                 is let go slowly); {driven}",
+                rounded(*last_s, 5)
             ),
-        );
-    }
+        )
+    });
+    restart(&times(true), restarted)
+        .into_iter()
+        .chain(driven)
+        .collect()
 }
 
 /// Relative frequency difference of modes that may be one mode of two stands.

@@ -25,6 +25,8 @@ pub(super) struct Set {
     pub window: Window,
     /// Whether the spectra are those of sample differences, divided by the response of the difference.
     pub of_differences: bool,
+    /// Whether the blocks are periods.
+    pub is_periodic: bool,
 }
 
 impl Set {
@@ -38,6 +40,7 @@ impl Set {
             added_rate: 0.0,
             window,
             of_differences: false,
+            is_periodic: false,
         }
     }
 
@@ -76,6 +79,9 @@ pub(super) fn blocks(
 }
 
 fn guess(applied: &[f64]) -> Excitation {
+    if is_of_two_levels(applied) {
+        return Excitation::Transient;
+    }
     let largest = applied.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     let quiet = applied.iter().filter(|v| v.abs() < 0.1 * largest).count();
     if quiet as f64 > AT_REST * applied.len() as f64 {
@@ -110,6 +116,28 @@ fn is_step(samples: &[f64]) -> bool {
             .into_iter()
             .zip(levels)
             .all(|e| spread(e) < STEADY * step)
+}
+
+/// Divisor of the record length for the ends of a step that comes early or late, and fraction of the samples that
+/// must lie at either level.
+const SHORT_END: usize = 50;
+const AT_LEVELS: f64 = 0.95;
+/// Minimum difference of the levels, relative to the range of the signal.
+const MOST_OF_IT: f64 = 0.5;
+
+/// Whether a signal stays at one level, then at another, with little in between.
+fn is_of_two_levels(samples: &[f64]) -> bool {
+    let count = (samples.len() / SHORT_END).max(1);
+    let [from, to] = [&samples[..count], &samples[samples.len() - count..]].map(mean);
+    let range = samples.iter().fold(0.0_f64, |m, v| m.max((v - from).abs()));
+    if (to - from).abs() < MOST_OF_IT * range {
+        return false;
+    }
+    let near = |v: &f64, level: f64| (v - level).abs() < STEADY * (to - from).abs();
+    let middle = samples.iter().position(|v| !near(v, from)).unwrap_or(0);
+    let (first, rest) = samples.split_at(middle);
+    let at_levels = first.len() + rest.iter().filter(|v| near(v, to)).count();
+    at_levels as f64 > AT_LEVELS * samples.len() as f64
 }
 
 fn mean(samples: &[f64]) -> f64 {
@@ -416,7 +444,10 @@ fn periodic(
     result
         .method
         .push(format!("periods of {period} samples, without the first"));
-    Ok(Set::new(all, rate_hz / period as f64, Window::None))
+    Ok(Set {
+        is_periodic: true,
+        ..Set::new(all, rate_hz / period as f64, Window::None)
+    })
 }
 
 /// Reports the level of noise and distortion.

@@ -40,6 +40,20 @@ fn natural_hz(pole: &Pole) -> f64 {
     pole.rate_per_s.hypot(pole.omega_rad_per_s) / TAU
 }
 
+/// Damping ratio above which a mode above the fitted band does not ring in it.
+const OVERDAMPED: f64 = 0.95;
+
+/// Whether a mode lies above the fitted band and does not ring: what is left of a delay or a filter.
+fn is_out_of_band(modal: &Modal, pole: &Pole) -> bool {
+    let natural = TAU * natural_hz(pole);
+    natural > modal.highest_rad_per_s && pole.rate_per_s > OVERDAMPED * natural
+}
+
+/// Whether a model has such a mode.
+pub(super) fn has_out_of_band(modal: &Modal) -> bool {
+    modal.poles.iter().any(|pole| is_out_of_band(modal, pole))
+}
+
 /// Whether a mode has no damping and is not drift.
 pub(super) fn is_undamped(pole: &Pole, set: &Set) -> bool {
     pole.rate_per_s == 0.0 && natural_hz(pole) >= set.step_hz
@@ -75,7 +89,7 @@ fn kinds(modal: &Modal, covariance: &Covariance, set: &Set) -> Vec<Option<Foreig
         let is_steady = is_uncertain && pole.rate_per_s < DECAYS.1 * set.step_hz;
         if natural_hz < set.step_hz || is_slow {
             Some(Foreign::Drift)
-        } else if natural_hz > highest_hz {
+        } else if natural_hz > highest_hz || is_out_of_band(modal, pole) {
             Some(Foreign::OutOfReach)
         } else if pole.rate_per_s == 0.0 || is_steady {
             Some(Foreign::Steady)

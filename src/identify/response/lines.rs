@@ -36,6 +36,7 @@ pub(super) fn band(set: &Set, options: &ResponseOptions) -> Result<Lines, Failur
             let on = |k: &usize| power(*k) > EXCITES * top;
             let first = (1..lines).find(on).unwrap_or(1);
             let last = (1..lines).rev().find(on).unwrap_or(1);
+            let last = last.max(last_answered(set, &frf.coherence));
             let excited = first..(last + 1).min(lines - 1);
             match set.of_differences && excited.len() > MOST_LINES {
                 true => strongest(set, &excited),
@@ -55,6 +56,22 @@ pub(super) fn band(set: &Set, options: &ResponseOptions) -> Result<Lines, Failur
         ));
     }
     Ok(range)
+}
+
+/// Minimum coherence of a line of a periodic excitation that counts because of its response.
+const COHERENT: f64 = 0.9;
+
+/// The last line of several periods whose response is strong and coherent: the lines of a square wave are weak at a
+/// resonance far above its fundamental, but excite it.
+fn last_answered(set: &Set, coherence: &[f64]) -> usize {
+    if !set.is_periodic || set.blocks.len() < 3 {
+        return 0;
+    }
+    let lines = coherence.len();
+    let power = |k: usize| -> f64 { set.blocks.iter().map(|b| b.measured[k].norm_sqr()).sum() };
+    let top = (1..lines).map(power).fold(0.0, f64::max);
+    let is_answered = |k: &usize| power(*k) > EXCITES * top && coherence[*k] > COHERENT;
+    (1..lines).rev().find(is_answered).unwrap_or(0)
 }
 
 /// Maximum number of fitted lines.
@@ -90,7 +107,13 @@ pub(super) fn data(powers: &Powers, set: &Set, lines: &Lines, options: &Response
             .clone()
             .map(|k| TAU * k as f64 * set.step_hz)
             .collect(),
-        weight: powers.iter().map(|p| (p / mean).sqrt()).collect(),
+        weight: powers
+            .iter()
+            .map(|p| match mean > 0.0 {
+                true => (p / mean).sqrt(),
+                false => 0.0,
+            })
+            .collect(),
         response,
         order: options.order,
         added_rate: set.added_rate,

@@ -64,6 +64,8 @@ pub(super) struct Modal {
     /// Why a mode does not belong to the stand; `None` if it does.
     pub foreign: Vec<Option<Foreign>>,
     scale: f64,
+    /// Highest fitted frequency in rad/s.
+    pub highest_rad_per_s: f64,
     order: i32,
 }
 
@@ -207,6 +209,7 @@ impl Data {
             fit: None,
             foreign: vec![None; poles.len()],
             scale: self.scale(),
+            highest_rad_per_s: self.band_rad_per_s().1,
             order: self.order,
         }
     }

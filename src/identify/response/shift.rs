@@ -3,6 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::blocks::Set;
+use super::foreign;
 use super::lines::Lines;
 use super::order::grow;
 use super::whole::Whole;
@@ -24,7 +25,11 @@ const STEPS_RAD: [f64; 3] = [0.4, 0.1, 0.02];
 /// fits are equal.
 const AS_GOOD: f64 = 1.001;
 
-/// The fit with a delay, if that explains the response with fewer modes at least as well as `coarse` does without: a
+/// Ratio of the error with a delay and fewer modes to that without, up to which the former is preferred to a pole above
+/// the band that does not ring.
+const AS_FEW: f64 = 1.02;
+
+/// The fit with a delay, if that explains the response with fewer modes about as well as `coarse` does without: a
 /// delay is not a sum of modes, so many modes are needed to imitate one.
 ///
 /// # Errors
@@ -42,7 +47,11 @@ pub(super) fn of(
         with_delay: true,
         ..data.clone()
     };
-    let enough = set.error(&coarse.response, lines);
+    let slack = match foreign::has_out_of_band(coarse) {
+        true => AS_FEW,
+        false => 1.0,
+    };
+    let enough = slack * set.error(&coarse.response, lines);
     for late in with_fewer_modes(&data, coarse.poles.len(), options) {
         let late = late?;
         if set.error(&late.response, lines) <= enough {

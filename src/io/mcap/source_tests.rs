@@ -253,7 +253,7 @@ fn two_publishers_on_a_topic_are_no_signal() {
     };
     let said = read("/x").unwrap_err().to_string();
     assert!(
-        said.contains("its channels 1 and 2 have messages between"),
+        said.contains("its channels 1 and 2 have interleaved messages"),
         "{said}"
     );
     read("/y").unwrap();

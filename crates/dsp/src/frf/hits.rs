@@ -29,6 +29,8 @@ pub enum HitFault {
     MeasuredClipped,
     /// The record ends soon after the hit.
     CutShort,
+    /// The next hit follows soon.
+    TooSoon,
 }
 
 impl fmt::Display for HitFault {
@@ -37,6 +39,9 @@ impl fmt::Display for HitFault {
             Self::ForceClipped => "its force is clipped",
             Self::MeasuredClipped => "its response is clipped",
             Self::CutShort => "the record ends soon after it",
+            Self::TooSoon => {
+                "the next hit follows before the response has lasted as long as that of others"
+            }
         })
     }
 }
@@ -92,15 +97,18 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
     let noise = spread(force, rest);
     let noises = [noise, noise_of(measured)];
     let lengths = |k: usize| starts.get(k + 1).copied().unwrap_or(force.len()) - starts[k];
-    let longest = (0..starts.len()).map(lengths).max().unwrap_or(0);
+    let enough = common_length(&(0..starts.len()).map(lengths).collect::<Vec<_>>());
     (0..peaks.len())
         .map(|k| {
             let range = starts[k]..starts[k] + lengths(k);
             let mut faults = faults([force, measured], noises, rest, peaks[k], range.clone());
             let second = (SECOND * size(peaks[k])).max(ABOVE_NOISE * noise);
             let second = second_stroke(&size, peaks[k], range.end, second);
-            if range.len() < longest / 2 {
-                faults.push(HitFault::CutShort);
+            if range.len() < enough {
+                faults.push(match k + 1 == starts.len() {
+                    true => HitFault::CutShort,
+                    false => HitFault::TooSoon,
+                });
             }
             Hit {
                 range,
@@ -110,6 +118,14 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
             }
         })
         .collect()
+}
+
+/// The length to which hits are cut: that which keeps most samples of all.
+fn common_length(lengths: &[usize]) -> usize {
+    let kept = |length: usize| length * lengths.iter().filter(|l| **l >= length).count();
+    let all = lengths.iter().copied();
+    all.max_by_key(|length| (kept(*length), *length))
+        .unwrap_or(0)
 }
 
 /// Sample with the largest force of each pulse, except pulses within `apart` samples of the preceding
