@@ -113,6 +113,8 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["not-viscous", "another damping law fits the envelope better than viscous damping", "look for the cause with diagnose"],
         ["one-direction", "the body moves in one direction only: dry friction and offset cannot be separated", "run it both ways"],
         ["one-series", "the loads were applied only once, so the repeatability is unknown", "repeat the series"],
+        ["rows-sorted", "the rows of loads are sorted by load and reading", "restore the order in which they were taken"],
+        ["unsettled-left-out", "readings right after changes of the load still settle and are left out", "let readings settle, or give one row per load"],
         ["one-weight", "a single load besides zero does not reveal a nonlinear characteristic", "apply further loads"],
         ["poor-fit", "the model does not explain much of the data", "check the columns; choose another range, band or degree"],
         ["zero-drifts", "the reading without load drifts over the test", "allow a longer warm-up, and read the zero of each record"],

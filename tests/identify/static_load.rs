@@ -327,3 +327,141 @@ fn the_hysteresis_of_repeated_readings_is_found() {
     let percent = hysteresis.unwrap().percent.unwrap();
     assert!((percent - 0.9).abs() < 0.4, "{percent} %");
 }
+
+/// 25 N m in five steps and back, 0.02 V/(N m) about 0.1 V, so many rows at each load; what is added to a row by its place
+/// among them, as part of the last step.
+fn staircase(rows: usize, lag: impl Fn(usize) -> f64, noise: &mut Noise) -> Vec<Point> {
+    let loads = [0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 20.0, 15.0, 10.0, 5.0, 0.0];
+    let mut points = Vec::new();
+    for (step, load) in loads.iter().enumerate() {
+        let before = if step == 0 { *load } else { loads[step - 1] };
+        for row in 0..rows {
+            let shown = load + (before - load) * lag(row);
+            points.push(Point {
+                load: *load,
+                reading: 0.1 + 0.02 * shown + 5e-4 * noise.normal(),
+                std: None,
+                series: 0,
+                position: 0,
+            });
+        }
+    }
+    points
+}
+
+#[test]
+fn readings_that_still_settle_are_left_out() {
+    let units = LoadUnits {
+        load: "N m".to_owned(),
+        reading: "V".to_owned(),
+    };
+    let mut noise = Noise(22);
+    let settling = |row: usize| (-0.2 * row as f64).exp();
+    for (is_settling, rows) in [(true, 200), (true, 60), (false, 200), (false, 4)] {
+        let lag = |row: usize| if is_settling { settling(row) } else { 0.0 };
+        let found = identify(&staircase(rows, lag, &mut noise), 1, &units).unwrap();
+        let slope = of(&found, "sensitivity");
+        let (value, std) = (slope.value(), slope.std().unwrap());
+        let codes: Vec<&str> = found.warnings.iter().map(|w| w.code).collect();
+        assert_eq!(
+            codes.contains(&"unsettled-left-out"),
+            is_settling,
+            "{rows}: {codes:?}"
+        );
+        assert!(!codes.contains(&"not-linear"), "{rows}: {codes:?}");
+        assert!(
+            (value - 0.02).abs() < 4.0 * std && std < 2e-4,
+            "{rows}: {value} ± {std}"
+        );
+    }
+}
+
+#[test]
+fn a_sorted_table_shows_no_drift() {
+    let units = LoadUnits {
+        load: "N m".to_owned(),
+        reading: "V".to_owned(),
+    };
+    let mut noise = Noise(23);
+    for _ in 0..20 {
+        let mut points = staircase(3, |_| 0.0, &mut noise);
+        points.sort_by(|a, b| {
+            (a.load, a.reading)
+                .partial_cmp(&(b.load, b.reading))
+                .unwrap()
+        });
+        let found = identify(&points, 1, &units).unwrap();
+        let slope = of(&found, "sensitivity");
+        let (value, std) = (slope.value(), slope.std().unwrap());
+        let codes: Vec<&str> = found.warnings.iter().map(|w| w.code).collect();
+        assert!(
+            codes.contains(&"rows-sorted") && !codes.contains(&"not-linear"),
+            "{codes:?}"
+        );
+        // 0.5 mV over √Σ(x − x̄)² = 47 N m.
+        assert!(
+            (value - 0.02).abs() < 4.0 * std && std < 3e-5,
+            "{value} ± {std}"
+        );
+    }
+}
+
+/// Readings of two decimals repeat exactly; their rounding is no curve.
+#[test]
+fn rounding_is_no_curve() {
+    let units = LoadUnits {
+        load: "N m".to_owned(),
+        reading: "V".to_owned(),
+    };
+    let mut points = staircase(3, |_| 0.0, &mut Noise(24));
+    for point in &mut points {
+        point.reading = ((0.1 + 0.0196 * point.load) * 100.0).round() / 100.0;
+    }
+    let found = identify(&points, 1, &units).unwrap();
+    assert!(
+        found.warnings.iter().all(|w| w.code != "not-linear"),
+        "{:?}",
+        found.warnings
+    );
+}
+
+/// A lens of 1 % between loading and unloading, closed at both ends.
+#[test]
+fn a_zero_that_the_curve_misses_is_uncertain_by_that() {
+    let units = LoadUnits {
+        load: "N m".to_owned(),
+        reading: "V".to_owned(),
+    };
+    let mut noise = Noise(25);
+    for lens in [0.0, 5e-4, 5e-3] {
+        let (mut points, mut outside) = (Vec::new(), 0);
+        for trial in 0..10 {
+            points.clear();
+            for series in 0..3 {
+                let shape = |k: usize| {
+                    let load = 5.0 * if k < 6 { k as f64 } else { 10.0 - k as f64 };
+                    let part = load / 25.0;
+                    let side = if k < 6 { 0.0 } else { 1.0 };
+                    (load, 0.5 * lens * side * 4.0 * part * (1.0 - part))
+                };
+                points.extend((0..11).map(shape).map(|(load, more)| Point {
+                    load,
+                    reading: 0.1 + 0.02 * load + more + 1e-4 * noise.normal(),
+                    std: None,
+                    series,
+                    position: 0,
+                }));
+            }
+            let found = identify(&points, 1, &units).unwrap();
+            let zero = of(&found, "zero");
+            let is_outside = (zero.value() - 0.1).abs() > 3.0 * zero.std().unwrap();
+            outside += usize::from(is_outside);
+            assert!(
+                outside <= 1,
+                "{lens}, {trial}: {} ± {:?}",
+                zero.value(),
+                zero.std()
+            );
+        }
+    }
+}

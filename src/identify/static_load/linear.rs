@@ -4,6 +4,7 @@
 //! has that error, whatever the characteristic (lack of fit; N. R. Draper, H. Smith, Applied Regression Analysis, 3rd
 //! ed., 1998, 2.1).
 
+use super::mixed::resolution;
 use super::steps::LoadSteps;
 use super::{NONE, Point, SAME, value_of};
 use crate::failure::{ErrorCode, Failure};
@@ -110,7 +111,11 @@ pub(super) fn warn(
     let each = (points.len() as f64 / count as f64).sqrt();
     let off = rms(&means);
     let deflection = (value_of(curve, steps.largest) - curve[0]).abs();
-    if off <= OFF.0 * scatter / each || off <= OFF.1 * deflection {
+    let readings: Vec<f64> = points.iter().map(|p| p.reading).collect();
+    // Rounding of equal readings is no scatter.
+    let rounding = resolution(&readings).unwrap_or(0.0) / 12.0_f64.sqrt();
+    let expected = (scatter / each).max(rounding);
+    if off <= OFF.0 * expected || off <= OFF.1 * deflection {
         return;
     }
     let why = match limit(&means, curve, steps) {
@@ -126,10 +131,12 @@ pub(super) fn warn(
     result.warn(
         "not-linear",
         format!(
-            "the mean readings deviate from the curve by {} % of the deflection, {} times what their scatter explains: \
-             {why}",
+            "the mean readings deviate from the curve by {} % of the deflection, {} what their scatter explains: {why}",
             rounded(100.0 * off / deflection, 2),
-            rounded(off * each / scatter.max(f64::MIN_POSITIVE), 2)
+            match expected > 0.0 {
+                true => format!("{} times", rounded(off / expected, 2)),
+                false => "more than".to_owned(),
+            }
         ),
     );
 }

@@ -38,7 +38,7 @@ const APART: f64 = 0.05;
 const LEAST_FREEDOM: usize = 3;
 /// Maximum number of steps with their own hysteresis, as the time of a fit grows with their square; with more, ranges
 /// of the load share one.
-const MOST_LOOPS: usize = 32;
+pub(super) const MOST_LOOPS: usize = 32;
 /// Variance ratios to the readings tried first: exponents of 10, in steps of a half.
 const TRIED: (i32, i32) = (-6, 16);
 /// Rounds over all variances, and halvings of the step after the first rounds.
@@ -93,7 +93,7 @@ pub(super) fn fit(
     // From −½ to ½, so that the zero is that of the middle row.
     let row = |i: usize| (i as f64 + 0.5) / points.len() as f64 - 0.5;
     let drift: Vec<f64> = (0..points.len()).map(row).collect();
-    let mut has_even_drift = model.is_apart(&drift);
+    let mut has_even_drift = model.has_order && model.is_apart(&drift);
     let mut ratios = None;
     if has_even_drift {
         let next = Mixed::of(points, degree, largest, std::slice::from_ref(&drift));
@@ -164,7 +164,7 @@ const OF_DIGIT: f64 = 1e-4;
 /// display. The quantisation of a converter is a different matter (`torqcomp_dsp::quality::quantisation`): any step
 /// with any offset, detected from hundreds of samples, while a display counts in powers of 10 from zero and is read
 /// five times.
-fn resolution(readings: &[f64]) -> Option<f64> {
+pub(super) fn resolution(readings: &[f64]) -> Option<f64> {
     let is_multiple = |digit: f64| {
         readings.iter().all(|r| {
             let digits = (r / digit).round();
@@ -225,6 +225,7 @@ impl Mixed {
             mountings: self.mountings.clone(),
             variances: vec![1.0; column.len()],
             is_known: false,
+            has_order: self.has_order,
         };
         let mean = column.iter().sum::<f64>() / column.len() as f64;
         let all: f64 = column.iter().map(|v| (v - mean).powi(2)).sum();
@@ -339,7 +340,11 @@ impl Mixed {
             .chain((TRIED.0..=TRIED.1).map(|k| unit * 10_f64.powf(0.5 * f64::from(k))))
             .collect();
         let mut least = plain.deviance;
-        let is_open = [true, self.series.count() > 0, self.mountings.count() > 0];
+        let is_open = [
+            self.has_order,
+            self.series.count() > 0,
+            self.mountings.count() > 0,
+        ];
         let mut attempt = |best: &mut VarianceRatios, place: usize, ratio: f64| {
             let mut next = *best;
             next[place] = ratio;

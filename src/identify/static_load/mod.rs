@@ -4,6 +4,7 @@ mod filter;
 mod groups;
 mod linear;
 mod mixed;
+mod rows;
 mod solve;
 mod steps;
 mod terms;
@@ -104,6 +105,8 @@ pub fn identify(
     degree: usize,
     units: &LoadUnits,
 ) -> Result<Identification, Failure> {
+    let (points, unsettled) = rows::settled(points);
+    let points = &points[..];
     let steps = LoadSteps::of(points);
     let (largest, count) = (steps.largest, steps.loads.len());
     let is_one_weight = degree == 1 && count == 2 && points.len() >= ONE_WEIGHT;
@@ -133,10 +136,15 @@ pub fn identify(
     linear::refuse_two_ranges(points, &steps)?;
     let mut fit = mixed::fit(points, degree, &steps)?;
     zero::walking(&mut fit, points, largest);
+    zero::off(&mut fit, points, largest);
     follows(points, &fit, largest)?;
     let unscale = |(k, v): (usize, &f64)| v / largest.powi(k as i32);
     let curve: Vec<f64> = fit.values.iter().enumerate().map(unscale).collect();
     let mut result = Identification::new("static");
+    rows::warn_unsettled(&mut result, unsettled);
+    if rows::is_sorted(points) {
+        rows::warn_sorted(&mut result);
+    }
     result.parameters = constants(&fit, largest, units);
     let quality = quality(&curve, points, units);
     poor(&mut result, quality.relative);

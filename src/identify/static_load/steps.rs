@@ -21,7 +21,7 @@ impl LoadSteps {
         let largest = points.iter().fold(0.0_f64, |m, p| m.max(p.load.abs()));
         let mut loads: Vec<f64> = points.iter().map(|p| p.load).collect();
         loads.sort_by(f64::total_cmp);
-        loads.dedup_by(|a, b| (*a - *b).abs() <= SAME * largest);
+        loads.dedup_by(|a, b| is_same_load(*a, *b, largest));
         Self {
             rows: rows_at(points, &loads, largest),
             is_rising: directions(points, largest),
@@ -37,10 +37,15 @@ impl LoadSteps {
     }
 }
 
+/// Whether two loads are one step; `largest` is the largest of all.
+pub(super) fn is_same_load(a: f64, b: f64, largest: f64) -> bool {
+    (a - b).abs() <= SAME * largest
+}
+
 /// Rows at each of the ascending loads. A row between two loads that hardly differ belongs to both.
 fn rows_at(points: &[Point], loads: &[f64], largest: f64) -> Vec<Vec<usize>> {
     let mut rows = vec![Vec::new(); loads.len()];
-    let is_at = |point: &Point, load: f64| (point.load - load).abs() <= SAME * largest;
+    let is_at = |point: &Point, load: f64| is_same_load(point.load, load, largest);
     for (i, point) in points.iter().enumerate() {
         let next = loads.partition_point(|load| *load <= point.load);
         let below = (0..next).rev().take_while(|k| is_at(point, loads[*k]));

@@ -17,6 +17,7 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::mixed::MOST_LOOPS;
 use super::steps::LoadSteps;
 use super::{NONE, Point, SAME, Term};
 
@@ -94,7 +95,12 @@ pub(super) fn terms(points: &[Point], steps: &LoadSteps, curve: &[f64]) -> Vec<T
     let mut seen = HashSet::new();
     let opens: Vec<bool> = positions.iter().map(|p| seen.insert(*p)).collect();
     let opens = |series: usize| opens[series];
-    let loaded = || steps.iter().filter(|s| s.0.abs() > NONE * largest);
+    // Loads that hardly repeat are no steps: differences between their rows are those of the loads.
+    let is_stepwise = steps.loads.len() <= MOST_LOOPS;
+    let loaded = || {
+        let steps = steps.iter().filter(|_| is_stepwise);
+        steps.filter(|s| s.0.abs() > NONE * largest)
+    };
     let value = |load: f64| -> f64 {
         let powers = curve.iter().enumerate().skip(1);
         powers.map(|(k, c)| c * load.powi(k as i32)).sum()

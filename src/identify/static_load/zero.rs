@@ -23,6 +23,23 @@ pub(super) fn walking(fit: &mut LoadCurve, points: &[Point], largest: f64) {
     fit.std[0] = Some(std.max(of_readings));
 }
 
+/// Standard uncertainties beyond which the zero of the curve contradicts the readings without load.
+const CONTRADICTS: f64 = 2.0;
+
+/// Makes the uncertainty of a zero that the readings without load contradict no less than the difference: the curve passes
+/// a hysteresis in the middle, which no load at its end shows.
+pub(super) fn off(fit: &mut LoadCurve, points: &[Point], largest: f64) {
+    let readings: Vec<f64> = without_load(points, largest).map(|p| p.reading).collect();
+    let Some(std) = fit.std[0].filter(|_| readings.len() > 1) else {
+        return;
+    };
+    let mean = readings.iter().sum::<f64>() / readings.len() as f64;
+    let off = (fit.values[0] - mean).abs();
+    if off > CONTRADICTS * std {
+        fit.std[0] = Some(off);
+    }
+}
+
 /// Minimum reported drift of the reading without load, relative to the largest deflection.
 const DRIFTS: f64 = 5e-3;
 
