@@ -14,6 +14,9 @@ const TIED_SIGNIFICANCE: f64 = 2.33;
 /// another.
 const TIED_GAIN: f64 = 9.0;
 
+/// Ratio of the errors up to which an effect with fewer parameters counts as no worse than one that is not determined.
+const NEARLY: f64 = 1.05;
+
 /// Accepts the best of the candidates that are not rejected, and compares the others with it.
 pub fn decide(tried: &mut [CandidateFit], base: &BaseModel, records: &Records) {
     let noisier = LazyCell::new(|| NoisierRecords::of(records));
@@ -58,7 +61,24 @@ fn is_tied(tried: &[CandidateFit], k: usize, best: usize) -> bool {
     let (Some(one), Some(other)) = (&tried[k].model, &tried[best].model) else {
         return false;
     };
-    k == best || one.is_no_worse_than(other)
+    let is_nearly = one.parameter_count() < other.parameter_count()
+        && one.compared_rms() < NEARLY * other.compared_rms();
+    k == best || one.is_no_worse_than(other) || is_nearly && is_undetermined(&tried[best])
+}
+
+/// Whether the records do not determine a parameter that cannot be zero, such as the frequency of a mode: the effect then
+/// imitates another.
+fn is_undetermined(candidate: &CandidateFit) -> bool {
+    let forms = candidate.effect.forms.iter();
+    let form = forms
+        .into_iter()
+        .find(|form| Some(form.name) == candidate.form);
+    let pairs = form.map(|form| form.parameters.iter().zip(&candidate.parameters));
+    pairs.into_iter().flatten().any(|(of, found)| {
+        let estimate = &found.estimate;
+        let is_unknown = |std: f64| std > estimate.value().abs();
+        of.lower > 0.0 && estimate.std_uncertainty().is_some_and(is_unknown)
+    })
 }
 
 impl ScoredModel {

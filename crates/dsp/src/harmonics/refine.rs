@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use super::leftover::Leftover;
-use super::{Fundamental, Projections, SineFit, rotate};
+use super::{Fundamental, Projections, SineFit, fit, rotate};
 use crate::Error;
 use crate::store::SampleStore;
 
@@ -17,6 +17,9 @@ const STEPS: usize = 30;
 const KEPT_TURNS: f64 = 1e-3;
 /// The same for the whole record, limited by rounding of the phase at its ends.
 const LAST_TURNS: f64 = 1e-10;
+
+/// Power of orders in a window, relative to that of a fit without, below which they are side lobes.
+const WINDOWED: f64 = 0.25;
 
 /// Finds the fundamental near `start_hz`, within the fraction `span` of it (0.01 is 1 %).
 ///
@@ -50,19 +53,37 @@ pub fn refine_fundamental(
     // Reports input errors before the search begins.
     SineFit::solve(samples, count, sample_rate_hz, start_hz, orders)?;
     let first = samples.part(0..length)?;
-    let mut frequency_hz = search(&first, sample_rate_hz, start_hz, span, orders);
+    let windowed = Windowed::of(&first, sample_rate_hz);
+    let mut frequency_hz = windowed.strongest(start_hz, span, orders);
     loop {
         let turns = match length == count {
             true => LAST_TURNS,
             false => KEPT_TURNS,
         };
-        let settled = Settled::of(samples, length, sample_rate_hz, frequency_hz, orders, turns)?;
+        let settled = Settled::of(samples, length, sample_rate_hz, frequency_hz, orders, turns);
+        let settled = settled.map_err(|error| match error {
+            // Of the frequency that was asked for, not of the start of these steps.
+            Error::NotRefined { why, .. } => Error::NotRefined { start_hz, why },
+            other => other,
+        })?;
         frequency_hz = settled.frequency_hz;
         if (frequency_hz / start_hz - 1.0).abs() > span {
             return Err(Error::NotRefined {
                 start_hz,
                 why: "no clear maximum within the search span",
             });
+        }
+        if length == first.len() {
+            // A side lobe of a stronger line elsewhere is a maximum without a window only.
+            let fundamental = Fundamental::given(frequency_hz);
+            let fitted = fit(&first[..], sample_rate_hz, 0.0, fundamental, orders)?;
+            let power = fitted.components.iter().map(|c| c.phasor.norm_sqr());
+            if windowed.power(frequency_hz, orders) < WINDOWED * power.sum::<f64>() {
+                return Err(Error::NotRefined {
+                    start_hz,
+                    why: "only side lobes of a line elsewhere within the search span",
+                });
+            }
         }
         if length == count {
             let std_hz = settled.std_hz(samples, orders)?;
@@ -75,34 +96,58 @@ pub fn refine_fundamental(
     }
 }
 
-/// Frequency with the largest power summed over its orders.
-fn search(samples: &[f64], rate_hz: f64, start_hz: f64, span: f64, orders: &[f64]) -> f64 {
-    let length = (4 * samples.len()).next_power_of_two();
-    let mean = samples.iter().sum::<f64>() / samples.len() as f64;
-    let mut padded = vec![0.0; length];
-    for (i, (slot, x)) in padded.iter_mut().zip(samples).enumerate() {
-        let turn = TAU * (i as f64 + 0.5) / samples.len() as f64;
-        *slot = (x - mean) * (0.5 - 0.5 * turn.cos());
+/// Spectrum of samples about their mean in a Hann window, zero-padded.
+struct Windowed {
+    lines: Vec<Complex64>,
+    /// Lines per Hz.
+    per_hz: f64,
+    /// Size of a line over the amplitude of a sine: a quarter of the number of samples.
+    size: f64,
+}
+
+impl Windowed {
+    fn of(samples: &[f64], rate_hz: f64) -> Self {
+        let length = (4 * samples.len()).next_power_of_two();
+        let mean = samples.iter().sum::<f64>() / samples.len() as f64;
+        let mut padded = vec![0.0; length];
+        for (i, (slot, x)) in padded.iter_mut().zip(samples).enumerate() {
+            let turn = TAU * (i as f64 + 0.5) / samples.len() as f64;
+            *slot = (x - mean) * (0.5 - 0.5 * turn.cos());
+        }
+        let transform = torqcomp_fourier::forward(length);
+        let mut lines: Vec<Complex64> = transform.make_output_vec();
+        transform
+            .process(&mut padded, &mut lines)
+            .expect("buffers were made for this length");
+        Self {
+            lines,
+            per_hz: length as f64 / rate_hz,
+            size: 0.25 * samples.len() as f64,
+        }
     }
-    let transform = torqcomp_fourier::forward(length);
-    let mut spectrum: Vec<Complex64> = transform.make_output_vec();
-    transform
-        .process(&mut padded, &mut spectrum)
-        .expect("buffers were made for this length");
-    let power_at = |frequency_hz: f64| {
-        let place = frequency_hz / rate_hz * length as f64;
-        let bin = (place as usize).min(spectrum.len() - 2);
-        let part = place - bin as f64;
-        spectrum[bin].norm_sqr() * (1.0 - part) + spectrum[bin + 1].norm_sqr() * part
-    };
-    let highest = orders.iter().copied().fold(0.0, f64::max);
-    let step_hz = rate_hz / length as f64 / highest.max(1.0);
-    let count = (span * start_hz / step_hz).ceil() as i64;
-    (-count..=count)
-        .map(|i| start_hz + i as f64 * step_hz)
-        .map(|f| (f, orders.iter().map(|o| power_at(o * f)).sum::<f64>()))
-        .fold((start_hz, 0.0), |a, b| if b.1 > a.1 { b } else { a })
-        .0
+
+    /// Sum of the squared amplitudes at the orders of a frequency.
+    fn power(&self, frequency_hz: f64, orders: &[f64]) -> f64 {
+        let at = |order: &f64| {
+            let place = order * frequency_hz * self.per_hz;
+            let bin = (place as usize).min(self.lines.len() - 2);
+            let part = place - bin as f64;
+            self.lines[bin].norm_sqr() * (1.0 - part) + self.lines[bin + 1].norm_sqr() * part
+        };
+        orders.iter().map(at).sum::<f64>() / (self.size * self.size)
+    }
+
+    /// Frequency with the largest power summed over its orders.
+    fn strongest(&self, start_hz: f64, span: f64, orders: &[f64]) -> f64 {
+        let highest = orders.iter().copied().fold(0.0, f64::max);
+        let step_hz = 1.0 / self.per_hz / highest.max(1.0);
+        let count = (span * start_hz / step_hz).ceil() as i64;
+        (-count..=count)
+            .map(|i| start_hz + i as f64 * step_hz)
+            .map(|f| (f, self.power(f, orders)))
+            .fold((start_hz, 0.0), |a, b| if b.1 > a.1 { b } else { a })
+            .0
+    }
 }
 
 /// A frequency whose last step was small enough.

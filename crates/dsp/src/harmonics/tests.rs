@@ -181,3 +181,23 @@ fn what_cannot_be_told_apart_is_refused() {
     let few = fit(&x[..3], 1000.0, 0.0, Fundamental::given(250.0), &[1.0]);
     assert!(matches!(few, Err(Error::TooShort { .. })));
 }
+
+/// 1 N m at 25 Hz for 4 s has side lobes between 30 and 40 Hz, where nothing turns.
+#[test]
+fn side_lobes_are_no_fundamental() {
+    let rate_hz = 5000.0;
+    let sample = |i: usize| {
+        let turn = TAU * 25.0 * i as f64 / rate_hz;
+        turn.cos() + 0.5 * (2.0 * turn).cos() + 0.2 * (6.0 * turn).cos()
+    };
+    let samples: Vec<f64> = (0..20_000).map(sample).collect();
+    let refined = |start_hz: f64| {
+        let found = refine_fundamental(&samples, rate_hz, start_hz, 0.02, &[1.0, 2.0, 3.0]);
+        found.map(|found| found.frequency_hz)
+    };
+    for start_hz in [20.0, 28.0, 30.0, 31.0, 33.0, 35.0, 40.0, 45.0] {
+        let found = refined(start_hz);
+        assert!(found.is_err(), "{start_hz}: {found:?}");
+    }
+    assert!((refined(25.2).unwrap() - 25.0).abs() < 1e-3);
+}
