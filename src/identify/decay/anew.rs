@@ -89,10 +89,10 @@ struct Cutting<'a, 'b> {
 }
 
 /// A fit to other stretches.
-type Cut<'a> = (Attempt<'a>, Vec<Stretch>, Beginning);
+type NewFit<'a> = (Attempt<'a>, Vec<Stretch>, Beginning);
 
 /// A moment from which on the ringing alone is fitted clearly better, or as well by fewer modes.
-struct Moment {
+struct Onset {
     time_s: f64,
     /// Samples before it, and the first behind it.
     before: usize,
@@ -109,7 +109,7 @@ struct Moment {
     is_better: bool,
 }
 
-impl Moment {
+impl Onset {
     /// Residual at the start of what is behind it.
     fn start(&self, residuals: &[f64]) -> f64 {
         rms(&residuals[..self.compared.min(residuals.len())])
@@ -126,7 +126,7 @@ impl<'a> Cutting<'a, '_> {
     }
 
     /// The fit with a cut, if one is better: both parts, if they ring alike, or else the later part from the first moment on.
-    fn best(&self) -> Result<Option<Cut<'a>>, FitError> {
+    fn best(&self) -> Result<Option<NewFit<'a>>, FitError> {
         let stretch = self.stretch();
         if !stretch.bands_hz.is_empty() {
             return Ok(None);
@@ -164,11 +164,11 @@ impl<'a> Cutting<'a, '_> {
     }
 
     /// A moment, if the ringing behind it is fitted better alone.
-    fn moment(&self, time_s: f64, period_s: f64) -> Result<Option<Moment>, FitError> {
+    fn moment(&self, time_s: f64, period_s: f64) -> Result<Option<Onset>, FitError> {
         let stretch = self.stretch();
         let place = |time_s: f64| stretch.times_s.partition_point(|t| *t < time_s);
         let period = place(stretch.times_s[0] + period_s);
-        let mut moment = Moment {
+        let mut moment = Onset {
             time_s: stretch.start_s + time_s,
             before: place(time_s - 0.5 * period_s),
             behind: place(time_s + 0.5 * period_s),
@@ -206,7 +206,7 @@ impl<'a> Cutting<'a, '_> {
     }
 
     /// Both parts as decays of their own, if what is left of them is alike.
-    fn both(&self, moment: &Moment) -> Result<Option<Cut<'a>>, FitError> {
+    fn both(&self, moment: &Onset) -> Result<Option<NewFit<'a>>, FitError> {
         if !moment.is_long(moment.before) {
             return Ok(None);
         }
@@ -226,7 +226,7 @@ impl<'a> Cutting<'a, '_> {
     }
 
     /// The later part, if the earlier one does not lead to it and does not ring at its frequency.
-    fn later(&self, moment: &Moment) -> Result<Option<Cut<'a>>, FitError> {
+    fn later(&self, moment: &Onset) -> Result<Option<NewFit<'a>>, FitError> {
         let stretch = self.stretch();
         if moment.apart < APART {
             return Ok(None);

@@ -6,7 +6,7 @@ use std::ops::Range;
 use num_complex::Complex64;
 use torqcomp_dsp::frf::{self, Block, Powers, Window};
 
-use super::{Driven, Excitation, ResponseOptions, check};
+use super::{Driven, Excitation, ResponseOptions, check, kind};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::hum::{self, without_mains};
 use crate::identify::{Identification, rms};
@@ -51,9 +51,6 @@ impl Set {
     }
 }
 
-/// Fraction of the samples at rest above which the excitation is a hammer.
-const AT_REST: f64 = 0.95;
-
 /// Amplitude at the end of a hit, relative to the largest, above which a window is needed.
 const RINGING: f64 = 5e-3;
 
@@ -69,7 +66,7 @@ pub(super) fn blocks(
     check::records(records)?;
     let excitation = options
         .excitation
-        .unwrap_or_else(|| guess(records[0].applied));
+        .unwrap_or_else(|| kind::guess(records[0].applied));
     match excitation {
         Excitation::Impact => impacts(records, result),
         Excitation::Transient => Ok(whole_transients(records, result)),
@@ -78,69 +75,12 @@ pub(super) fn blocks(
     }
 }
 
-fn guess(applied: &[f64]) -> Excitation {
-    if is_of_two_levels(applied) {
-        return Excitation::Transient;
-    }
-    let largest = applied.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    let quiet = applied.iter().filter(|v| v.abs() < 0.1 * largest).count();
-    if quiet as f64 > AT_REST * applied.len() as f64 {
-        Excitation::Impact
-    } else if is_step(applied) {
-        Excitation::Transient
-    } else if frf::find_period(applied).is_some() {
-        Excitation::Periodic
-    } else {
-        Excitation::Random
-    }
-}
-
 /// Divisor of the record length that gives the length at either end over which levels are
 /// estimated.
-const END: usize = 10;
-/// Spread of a signal within either end, relative to the difference of their levels, below which it is
-/// a step.
-const STEADY: f64 = 0.1;
+pub(super) const END: usize = 10;
 
-/// Whether a signal goes from one steady level to another.
-fn is_step(samples: &[f64]) -> bool {
-    let count = (samples.len() / END).max(1);
-    let ends = [&samples[..count], &samples[samples.len() - count..]];
-    let levels = ends.map(mean);
-    let spread = |(end, level): (&[f64], f64)| -> f64 {
-        rms(&end.iter().map(|v| v - level).collect::<Vec<f64>>())
-    };
-    let step = (levels[1] - levels[0]).abs();
-    step > 0.0
-        && ends
-            .into_iter()
-            .zip(levels)
-            .all(|e| spread(e) < STEADY * step)
-}
-
-/// Divisor of the record length for the ends of a step that comes early or late, and fraction of the samples that
-/// must lie at either level.
-const SHORT_END: usize = 50;
-const AT_LEVELS: f64 = 0.95;
-/// Minimum difference of the levels, relative to the range of the signal.
-const MOST_OF_IT: f64 = 0.5;
-
-/// Whether a signal stays at one level, then at another, with little in between.
-fn is_of_two_levels(samples: &[f64]) -> bool {
-    let count = (samples.len() / SHORT_END).max(1);
-    let [from, to] = [&samples[..count], &samples[samples.len() - count..]].map(mean);
-    let range = samples.iter().fold(0.0_f64, |m, v| m.max((v - from).abs()));
-    if (to - from).abs() < MOST_OF_IT * range {
-        return false;
-    }
-    let near = |v: &f64, level: f64| (v - level).abs() < STEADY * (to - from).abs();
-    let middle = samples.iter().position(|v| !near(v, from)).unwrap_or(0);
-    let (first, rest) = samples.split_at(middle);
-    let at_levels = first.len() + rest.iter().filter(|v| near(v, to)).count();
-    at_levels as f64 > AT_LEVELS * samples.len() as f64
-}
-
-fn mean(samples: &[f64]) -> f64 {
+/// Mean of samples.
+pub(super) fn mean(samples: &[f64]) -> f64 {
     samples.iter().sum::<f64>() / samples.len() as f64
 }
 

@@ -4,6 +4,7 @@ mod blocks;
 mod check;
 mod foreign;
 mod inverse;
+mod kind;
 mod lines;
 mod modal;
 mod order;

@@ -96,19 +96,12 @@ pub fn series_of(loads: &[f64]) -> Vec<usize> {
 /// Minimum number of rows for a single load and no load.
 const ONE_WEIGHT: usize = 5;
 
-/// Evaluates the points with a curve of degree 1 or 3.
+/// Whether there is one load beside no load, which suffices for a straight line.
 ///
 /// # Errors
 /// If there are too few loads for the degree, or the reading does not change.
-pub fn identify(
-    points: &[Point],
-    degree: usize,
-    units: &LoadUnits,
-) -> Result<Identification, Failure> {
-    let (points, unsettled) = rows::settled(points);
-    let points = &points[..];
-    let steps = LoadSteps::of(points);
-    let (largest, count) = (steps.largest, steps.loads.len());
+fn one_weight(points: &[Point], degree: usize, steps: &LoadSteps) -> Result<bool, Failure> {
+    let count = steps.loads.len();
     let is_one_weight = degree == 1 && count == 2 && points.len() >= ONE_WEIGHT;
     if count < degree + 2 && !is_one_weight {
         let or = match degree {
@@ -132,6 +125,23 @@ pub fn identify(
             "the reading does not change with load; check --reading and the bridge supply",
         ));
     }
+    Ok(is_one_weight)
+}
+
+/// Evaluates the points with a curve of degree 1 or 3.
+///
+/// # Errors
+/// If there are too few loads for the degree, or the reading does not change.
+pub fn identify(
+    points: &[Point],
+    degree: usize,
+    units: &LoadUnits,
+) -> Result<Identification, Failure> {
+    let (points, unsettled) = rows::settled(points);
+    let points = &points[..];
+    let steps = LoadSteps::of(points);
+    let largest = steps.largest;
+    let is_one_weight = one_weight(points, degree, &steps)?;
     groups::refuse_mixed(points)?;
     linear::refuse_two_ranges(points, &steps)?;
     let mut fit = mixed::fit(points, degree, &steps)?;

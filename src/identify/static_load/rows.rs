@@ -48,7 +48,7 @@ pub(super) fn warn_sorted(result: &mut Identification) {
 
 /// The points without those in which the reading still settles after a change of the load, and the number of these.
 pub(super) fn settled(points: &[Point]) -> (Vec<Point>, usize) {
-    let runs: Vec<Run> = runs(points).map(Run::of).collect();
+    let runs: Vec<LoadRun> = runs(points).map(LoadRun::of).collect();
     let lags: Vec<usize> = std::iter::once(0)
         .chain(
             runs.windows(2)
@@ -90,13 +90,13 @@ fn runs(points: &[Point]) -> impl Iterator<Item = &[Point]> {
 }
 
 /// Consecutive points at one load, with level and noise of their last third.
-struct Run<'a> {
+struct LoadRun<'a> {
     points: &'a [Point],
     level: f64,
     noise: f64,
 }
 
-impl<'a> Run<'a> {
+impl<'a> LoadRun<'a> {
     fn of(points: &'a [Point]) -> Self {
         let last = &points[points.len() - points.len().div_ceil(3)..];
         let level = last.iter().map(|p| p.reading).sum::<f64>() / last.len() as f64;
@@ -109,7 +109,7 @@ impl<'a> Run<'a> {
     }
 
     /// Number of first rows in which the reading is still on its way from the level before; 0 if the first is not.
-    fn unsettled_after(&self, before: &Run) -> usize {
+    fn unsettled_after(&self, before: &LoadRun) -> usize {
         let count = self.points.len();
         let jump = self.level - before.level;
         let lag = |p: &Point| (self.level - p.reading) / jump;

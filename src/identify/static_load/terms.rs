@@ -29,12 +29,12 @@ struct Deflections<'a> {
     zeros: Vec<f64>,
 }
 
-/// Rows at a load.
-type Rows<'a> = &'a [usize];
+/// StepRows at a load.
+type StepRows<'a> = &'a [usize];
 
 impl Deflections<'_> {
     /// Series and deflection of each of these rows, for loading (`up`) or unloading, in the wanted series.
-    fn at(&self, rows: Rows, up: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<(usize, f64)> {
+    fn at(&self, rows: StepRows, up: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<(usize, f64)> {
         rows.iter()
             .filter(|i| self.steps.is_rising[**i] == up && wanted(self.points[**i].series))
             .map(|i| {
@@ -45,7 +45,12 @@ impl Deflections<'_> {
     }
 
     /// The same with one value per series: the mean if the load was applied repeatedly.
-    fn by_series(&self, rows: Rows, up: bool, wanted: &dyn Fn(usize) -> bool) -> Vec<(usize, f64)> {
+    fn by_series(
+        &self,
+        rows: StepRows,
+        up: bool,
+        wanted: &dyn Fn(usize) -> bool,
+    ) -> Vec<(usize, f64)> {
         let all = self.at(rows, up, wanted);
         let of = |part: &[(usize, f64)]| {
             let values: Vec<f64> = part.iter().map(|p| p.1).collect();
@@ -54,13 +59,13 @@ impl Deflections<'_> {
         all.chunk_by(|a, b| a.0 == b.0).map(of).collect()
     }
 
-    fn values(&self, rows: Rows, wanted: &dyn Fn(usize) -> bool) -> Vec<f64> {
+    fn values(&self, rows: StepRows, wanted: &dyn Fn(usize) -> bool) -> Vec<f64> {
         let each = self.by_series(rows, true, wanted);
         each.into_iter().map(|(_, value)| value).collect()
     }
 
     /// Mean over the series of |unloading − loading| over loading.
-    fn reversibility(&self, rows: Rows) -> Option<f64> {
+    fn reversibility(&self, rows: StepRows) -> Option<f64> {
         let up = self.by_series(rows, true, &|_| true);
         let mut down = HashMap::new();
         for (series, back) in self.by_series(rows, false, &|_| true) {

@@ -1,5 +1,6 @@
 //! One table of numbers with the lines above it: found in the first bytes of a text, then read.
 
+mod content;
 mod counts;
 mod warnings;
 
@@ -8,23 +9,21 @@ use std::sync::Arc;
 
 use super::axes::{AxisPlan, Role, Sources, StampRule};
 use super::blocks::{self, TableEnd};
-use super::cell::{Cell, foreign_spelling};
+use super::cell::foreign_spelling;
 use super::chunks::{Chunks, Piece};
-use super::head::{self, Head, Table};
+use super::head;
 use super::header::{self, Field, Header};
 use super::last_line::{LastLine, last_line};
-use super::rows::{Column, ColumnKind, Item, RowPlan, Rows, cleaned, items};
+use super::rows::{Column, ColumnKind, RowPlan, Rows, cleaned};
 use super::tail::Tail;
 use super::{cells_with_units, listing, sparse, summary};
 use crate::failure::Failure;
 use crate::io::{Reading, names_compensated};
-use crate::recording::text::dialect::{Dialect, decode_line, is_skipped};
+use crate::recording::text::dialect::{Dialect, decode_line};
 use crate::recording::{AllSamples, Channel, TimeAxis};
 use crate::warning::Warning;
-use counts::Counts;
+use content::{column_kinds, first_row, named_items};
 
-/// Number of rows that determine the content of a column.
-const SAMPLE: usize = 400;
 /// Number of bytes of rows that determine the columns and their time.
 pub const FIRST_ROWS: usize = 1 << 16;
 /// Minimum number of these rows, for a table with many columns …
@@ -429,65 +428,4 @@ pub fn channel(field: &Field, mut column: Column, mut axis: TimeAxis) -> Channel
         filled: Vec::new(),
         is_compensated: names_compensated(&field.heading),
     }
-}
-
-/// Content of each column in the rows from a line on, and its first date or time.
-fn column_kinds(
-    head: &Head,
-    table: &Table,
-    first: usize,
-) -> Vec<(Option<ColumnKind>, Option<String>)> {
-    let mut counts = vec![Counts::default(); table.width];
-    let rows = head.lines[first..]
-        .iter()
-        .filter(|line| !is_skipped(&line.text))
-        .take(SAMPLE);
-    for line in rows {
-        let cells = table.dialect.cells(&line.text);
-        for (count, cell) in counts.iter_mut().zip(&cells) {
-            count.add(cell, table.dialect.decimal);
-        }
-    }
-    counts.into_iter().map(Counts::kind).collect()
-}
-
-/// Columns whose values are identified by names in other columns.
-fn named_items(head: &Head, header: &Header, first: usize, dialect: Dialect) -> Vec<Item> {
-    let headings: Vec<&str> = header
-        .fields
-        .iter()
-        .map(|field| field.heading.as_str())
-        .collect();
-    items(&headings, &dialect.cells(&head.lines[first].text))
-}
-
-/// The first row: a faulty row may be between the headings and the first good one; it belongs to the
-/// table, so that the fault is reported. A single integer may be the number of rows.
-fn first_row(head: &Head, table: &Table, header: &Header) -> usize {
-    let Some(names) = &header.names else {
-        return table.first;
-    };
-    let from = head.lines[..table.first]
-        .iter()
-        .rposition(|line| line.text == *names);
-    let from = from.map_or(table.first, |line| line + 1);
-    (from..table.first)
-        .rev()
-        .filter(|line| !is_skipped(&head.lines[*line].text))
-        .take_while(|line| {
-            let cells = table.dialect.cells(&head.lines[*line].text);
-            let read: Vec<Cell> = cells
-                .iter()
-                .map(|cell| Cell::read(cell, table.dialect.decimal))
-                .collect();
-            let numbers = read.iter().filter(|cell| cell.is_number()).count();
-            numbers > 0
-                && (read.len() >= table.width
-                    || cells[0].contains(char::from(table.dialect.decimal)))
-                && !cells[0].is_empty()
-                && read[0] != Cell::Text
-                && !head::is_numbering(&cells)
-        })
-        .last()
-        .unwrap_or(table.first)
 }

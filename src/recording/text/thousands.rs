@@ -47,7 +47,7 @@ pub(super) fn refuse(head: &Head, table: &Table, others: &[&Table]) -> Result<()
 /// digits and not preceded by a zero, and the numbers without one are integers of at most three digits. Numbers with
 /// a fixed number of decimals have a point in all of them, and those with as many as needed have other counts.
 fn grouped_place(head: &Head, table: &Table, other: Dialect) -> Option<usize> {
-    let mut columns = vec![Column::default(); table.width];
+    let mut columns = vec![MarkedColumn::default(); table.width];
     for (place, line) in head.lines.iter().enumerate().skip(table.first) {
         if is_skipped(&line.text) {
             continue;
@@ -73,7 +73,7 @@ fn comma_place(head: &Head, table: &Table) -> Option<usize> {
 
 /// Format of the numbers of a column.
 #[derive(Default, Clone)]
-struct Column {
+struct MarkedColumn {
     /// The line of the first one with thousands separators.
     grouped: Option<usize>,
     /// Whether some are integers too small for a separator.
@@ -82,7 +82,7 @@ struct Column {
     has_others: bool,
 }
 
-impl Column {
+impl MarkedColumn {
     fn add(&mut self, place: usize, text: &str, decimal: u8) {
         let digits = text.trim_start_matches(['+', '-']);
         let is_plain = digits.len() <= GROUP && digits.bytes().all(|b| b.is_ascii_digit());
