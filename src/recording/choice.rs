@@ -1,12 +1,14 @@
 //! Selection of one channel of a recording, the same for every format and command.
 
+use std::collections::BTreeSet;
+
 use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
 use torqcomp_model::Unit;
 
 use super::axis::{REVERSED, UNIFORM, falls, step_of};
 use super::moment::Moment;
 use super::text::CELLS_WITH_UNITS;
-use super::{Channel, RateFrom, Recording, check_holes, check_size, formats};
+use super::{Channel, Hole, HoleKind, RateFrom, Recording, check_holes, check_size, formats};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading, digits};
 use crate::print::{list, plural};
@@ -341,6 +343,37 @@ impl Recording {
         check_size(channel)?;
         let (unit, warning) = unit_of(choice, &channel.heading, channel.unit.as_ref())?;
         Ok((channel, unit, warning))
+    }
+
+    /// The same without rows that are blank in all channels, such as lines between the series of a table.
+    pub(crate) fn without_blank_rows(mut self) -> Self {
+        let is_blank = |hole: &Hole| matches!(hole.what, HoleKind::Empty | HoleKind::Missing);
+        let blanks = |channel: &Channel| -> BTreeSet<usize> {
+            let holes = channel.holes.iter().filter(|hole| is_blank(hole));
+            holes.map(|hole| hole.index).collect()
+        };
+        let count = |channel: &Channel| channel.samples.len();
+        if self
+            .channels
+            .windows(2)
+            .any(|pair| count(&pair[0]) != count(&pair[1]))
+        {
+            return self;
+        }
+        let common = self.channels.iter().map(blanks);
+        let common = common.reduce(|a, b| a.intersection(&b).copied().collect());
+        let common = common.unwrap_or_default();
+        for channel in &mut self.channels {
+            let mut place = 0..;
+            channel
+                .samples
+                .retain(|_| place.next().is_some_and(|k| !common.contains(&k)));
+            channel.holes.retain(|hole| !common.contains(&hole.index));
+            for hole in &mut channel.holes {
+                hole.index -= common.range(..hole.index).count();
+            }
+        }
+        self
     }
 
     /// The selected channel, whatever its rate.

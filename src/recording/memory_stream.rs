@@ -91,12 +91,12 @@ pub(super) fn used_stamps(channel: &Channel, reading: &Reading) -> Option<Arc<Ve
 
 /// Rejects non-numeric cells among the samples, and among the stamps if these are used.
 pub(crate) fn check_cells(channel: &Channel, reading: &Reading) -> Result<(), Failure> {
-    refuse_holes(channel, used_stamps(channel, reading).is_some())
+    refuse_holes(channel, used_stamps(channel, reading).is_some(), BRIDGE)
 }
 
-/// Rejects non-numeric samples, whatever their time.
+/// Rejects non-numeric samples of a table without a time, in which none is bridged.
 pub(crate) fn check_holes(channel: &Channel) -> Result<(), Failure> {
-    refuse_holes(channel, false)
+    refuse_holes(channel, false, "correct or delete the row")
 }
 
 /// Maximum magnitude of a sample; the squares of larger ones overflow.
@@ -118,7 +118,7 @@ pub(crate) fn check_size(channel: &Channel) -> Result<(), Failure> {
     ))
 }
 
-fn refuse_holes(channel: &Channel, by_stamps: bool) -> Result<(), Failure> {
+fn refuse_holes(channel: &Channel, by_stamps: bool, remedy: &str) -> Result<(), Failure> {
     let of_time = channel.axis.holes.iter().filter(|_| by_stamps);
     let of_time = of_time.filter(|hole| hole.index < channel.samples.len());
     let stamps_in = channel.axis.stamps_in.as_deref().unwrap_or("time");
@@ -146,7 +146,7 @@ fn refuse_holes(channel: &Channel, by_stamps: bool) -> Result<(), Failure> {
     let refused = Failure::failed(
         ErrorCode::InvalidSample,
         format_args!(
-            "the value of \"{name}\" {what} ({} in all); {BRIDGE}",
+            "the value of \"{name}\" {what} ({} in all); {remedy}",
             plural(count, "such cell")
         ),
     );

@@ -465,3 +465,33 @@ fn a_zero_that_the_curve_misses_is_uncertain_by_that() {
         }
     }
 }
+
+#[test]
+fn blank_lines_between_series_are_no_rows() {
+    let folder = Folder::new();
+    let series = "0,0.1000\n5,0.2001\n10,0.2999\n5,0.2002\n0,0.1001\n";
+    let heading = "load (N m),reading (V)\n";
+    folder.write("plain.csv", format!("{heading}{series}{series}"));
+    folder.write("blank.csv", format!("{heading}{series}\n{series}"));
+    folder.write("ol.csv", format!("{heading}{series}5,OL\n{series}"));
+    let of = |name: &str| {
+        let args = ["identify", "static", name, "--load", "load", "--reading"];
+        folder.run(&[&args[..], &["reading"]].concat())
+    };
+    let [plain, blank] = ["plain.csv", "blank.csv"].map(of);
+    assert_eq!(plain.code, 0, "{}", plain.stderr);
+    let constants = |text: &str| {
+        text.lines()
+            .skip(1)
+            .take(9)
+            .map(str::to_owned)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(
+        constants(&plain.stdout),
+        constants(&blank.stdout),
+        "{}",
+        blank.stderr
+    );
+    of("ol.csv").says(1, &["line 7", "correct or delete the row"]);
+}

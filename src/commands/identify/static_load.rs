@@ -38,6 +38,7 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
     };
     let columns = Columns::of(args);
     let recording = Recording::read(&Input::of(&args.input), &columns.all(), &reading)?;
+    let recording = recording.without_blank_rows();
     let mut recorded = Recorded::default();
     let (points, units) = points(args, &columns, &recording, &mut recorded.warnings)?;
     let result = identify(&points, args.degree, &units)?;
