@@ -41,18 +41,18 @@ fn compare(name: &str, page: &str) {
 fn the_list_of_effects_is_that_of_the_code() {
     let mut page = format!(
         "# Effects\n\n{WRITTEN}\n\
-         What a plain stand `x'' + 2 zeta w0 x' + w0^2 x = w0^2 G u` can lack, `u` the applied and `x` the recorded \
-         quantity. A stand file declares an effect by its kind, its form (the first one by default) and its \
+         Effects beyond the plain stand `x'' + 2 zeta w0 x' + w0^2 x = w0^2 G u`, with `u` the applied and `x` the \
+         recorded quantity. A stand file declares an effect by its kind, its form (the first one by default) and its \
          parameters:\n\n\
          ```toml\n[[effects]]\nkind = \"coulomb-friction\"\nform = \"tanh\"\ntorque = \"2.5 N m\"\n\
          transition_speed = \"40 N m/s\"\n```\n\n\
-         `diagnose` finds effects in records and writes them into the stand file; `simulate` applies them, and \
-         `compensate` takes them back ([how](compensation.md)). In the equations `n` is a torque beside `x`, \
-         `x'' + 2 zeta w0 x' + w0^2 (x + n) = w0^2 G u`, and `y` is the record. Units are powers of \
-         N m, the unit of the torque, whatever the unit of the record that a calibration makes it from; of a stand with \
-         `static_gain`, of the unit of the record in it, here V; and of the second. Bounds are those of `diagnose`, in multiples of what the table says: \
-         `rms` and `peak` of the record about its mean, `w0` and `f0` the natural frequency in rad/s and Hz, `length` of \
-         the record in s. A stand file may go beyond them.\n\n"
+         `diagnose` finds effects in records and writes them into the stand file, `simulate` applies them, and \
+         `compensate` removes them ([how](compensation.md)). In the equations, `n` is a torque in the stand, \
+         `x'' + 2 zeta w0 x' + w0^2 (x + n) = w0^2 G u`, and `y` is the record. Units are powers of N m and s, whatever \
+         the unit of the record from which a calibration gives the torque; for a stand with `static_gain`, N m is \
+         replaced by the unit of the record in that key, V in the tables below. Bounds are those of `diagnose`, in \
+         multiples of `rms` and `peak` of the record about its mean, of `w0` and `f0`, the natural frequency in rad/s and \
+         Hz, and of the `length` of the record in s. A stand file may exceed them.\n\n"
     );
     for effect in EFFECTS {
         write!(page, "- [`{0}`](#{0})", effect.name).unwrap();
@@ -162,7 +162,7 @@ fn scale(parameter: &EffectParameter) -> String {
 fn the_list_of_stand_keys_is_that_of_the_code() {
     let mut page = format!(
         "# Keys of the stand file\n\n{WRITTEN}\n\
-         How a stand file is written: [stand-file.md](stand-file.md). A quantity is a text with its unit, as in the \
+         For how to write a stand file, see [stand-file.md](stand-file.md). A quantity is a text with its unit, as in the \
          examples, or a table `{{ value = \"…\", std = \"…\", source = \"…\" }}`.\n"
     );
     for (title, about, keys) in SECTIONS {
@@ -305,8 +305,8 @@ fn the_list_of_warnings_is_that_of_the_code() {
     let mut page = format!(
         "# Warnings\n\n{WRITTEN}\n\
          Every verb reports warnings with a stable code, in the text and as `warnings[] {{code, message}}` in the JSON \
-         document; `--strict` makes one end with exit code 3. What raises those about samples and the time axis, and how \
-         often by chance: [inspect.md](inspect.md).\n"
+         document; with `--strict` any warning gives exit code 3. For the warnings about samples and the time axis, \
+         [inspect.md](inspect.md) gives their criteria and false-alarm rates.\n"
     );
     for (group, codes) in CODES {
         write!(
@@ -367,11 +367,11 @@ fn every_warning_is_listed_and_every_code_is_used() {
 fn the_list_of_documents_is_that_of_the_code() {
     let mut page = format!(
         "# JSON documents\n\n{WRITTEN}\n\
-         What `--json` prints. Each document names its form in `schema`; `torqcomp schema` lists the forms, and \
-         `torqcomp schema NAME` prints the JSON Schema (2020-12) of one. Keys may be added to a form; what is there stays. A \
-         number that is unknown is `null`. Below, `[]` stands for the items of a list.\n\n\
-         If a command fails, `--json` prints [`torqcomp.error/1`](#error) in the place of the report, unless a report is \
-         out already; the exit code is the same as without it.\n"
+         The output of `--json`. Each document names its type in `schema`; `torqcomp schema` lists the types, and \
+         `torqcomp schema NAME` prints the JSON Schema (2020-12) of one. Keys may be added to a type; existing keys stay. \
+         Unknown numbers are `null`. Below, `[]` stands for the items of a list.\n\n\
+         If a command fails, `--json` prints [`torqcomp.error/1`](#error) instead of the report, unless the report has \
+         been printed already; the exit code does not change.\n"
     );
     for (document, text) in DOCUMENTS.iter().zip(types::texts()) {
         let own = format!("../src/commands/schema/{}.json", document.name);

@@ -122,6 +122,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["restart-in-decay", "the ringing starts again within a decay", "hit once, and check for lost samples and overload"],
         ["second-stroke", "the hammer struck twice; the recorded force includes both strokes", "repeat the hit if the coherence is low"],
         ["noise-on-force", "noise on the hammer's force signal counts as force, so the response is too small", "use DC coupling for the hammer, or record so that its signal is at rest after the stroke"],
+        ["hits-overlap", "a hit follows before the response to the previous one has decayed", "wait longer between hits, or add --excitation transient"],
         ["short-pulse", "the hammer pulses are so short that frequencies above half the sampling rate alias into their spectrum", "record at a higher rate, or use a softer tip"],
         ["speed-unknown", "the speed is known only up to a constant, so the offset includes friction", "record position or speed"],
         ["tone-taken-off", "steady lines were fitted along with the decay and removed", "switch off running machinery; record for longer if one of them is the stand's own"],

@@ -630,3 +630,50 @@ fn a_torque_that_comes_on_or_off_is_a_transient() {
         }
     }
 }
+
+/// Twelve hits of 5 ms, 0.25 s or 1 s apart, on a stand that still rings at 1.4 % after 0.25 s.
+#[test]
+fn hits_that_follow_soon_are_used_and_named() {
+    let (omega, damping_ratio, rate_hz) = (TAU * 180.0, 0.015, 10_000.0);
+    for (apart_s, overlaps) in [(0.25, true), (1.0, false)] {
+        let mut noise = Noise(26);
+        let hits = 12;
+        let (mut x, mut speed, step_s) = (0.0, 0.0, 1e-6);
+        let (mut applied, mut measured) = (Vec::new(), Vec::new());
+        let length_s = f64::from(hits) * apart_s + 0.9;
+        for k in 0..(length_s / step_s) as usize {
+            let t = k as f64 * step_s - 0.1;
+            let since = t - apart_s * (t / apart_s).floor().clamp(0.0, f64::from(hits - 1));
+            let force = match (0.0..5e-3).contains(&since) {
+                true => (0.5 * TAU * since / 5e-3).sin(),
+                false => 0.0,
+            };
+            if k % 100 == 0 {
+                applied.push(force);
+                measured.push(x + 1e-4 * noise.normal());
+            }
+            speed += step_s * (omega * omega * (force - x) - 2.0 * damping_ratio * omega * speed);
+            x += step_s * speed;
+        }
+        let record = response::Driven {
+            name: "hits",
+            rate_hz,
+            applied: &applied,
+            measured: &measured,
+        };
+        let options = response::ResponseOptions {
+            modes: Some(1),
+            ..response::ResponseOptions::default()
+        };
+        let found = response::identify(&[record], &options).unwrap();
+        let codes: Vec<&str> = found.warnings.iter().map(|w| w.code).collect();
+        assert_eq!(
+            codes.contains(&"hits-overlap"),
+            overlaps,
+            "{apart_s} s: {codes:?}"
+        );
+        assert!(!codes.contains(&"hit-left-out"), "{apart_s} s: {codes:?}");
+        let hz = of(&found, "natural_frequency").value();
+        assert!((hz - 180.0).abs() < 0.1, "{apart_s} s: {hz} Hz");
+    }
+}

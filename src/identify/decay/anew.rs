@@ -1,57 +1,49 @@
-//! Moments at which a decay begins anew, seen once a fit of the whole has failed: a second hit in noise, or the end of a push.
+//! Second hits in noise, and pushes that are not free decays yet: segments that restart, found after a fit.
 //!
-//! Demodulated at the strongest line of the residual and averaged over a period, free ringing of one mode is
-//! `z(t) = A e^{st}`. On both sides of a moment, `z` is fitted with one `s` and an amplitude each; a hit lets the amplitude
-//! jump. The moment counts if the ringing behind it, fitted alone, leaves clearly less there than the fit of the whole. The
-//! parts are then decays of their own, or, where the part before is no free ringing of these modes, only the later one is.
+//! Where the amplitude of a line jumps ([`super::jumps`]), the part after it is fitted alone. If that leaves a clearly smaller
+//! residual there than the fit of the whole segment, or as small a one with fewer modes, the parts are separate decays. If
+//! the part before is no free decay of these modes, only the part after it is used.
 
-use num_complex::Complex64;
 use torqcomp_model::fit::FitError;
 
 use super::attempt::Attempt;
+use super::jumps::jumps_s;
 use super::modes::Stretch;
 use super::search::{ModeSearch, search};
 use crate::identify::hum::SteadyLine;
 use crate::identify::{Pole, rms};
 
-/// Points of the demodulated signal in a period.
-const A_PERIOD: usize = 4;
-/// Points on either side of a moment that are fitted, and those next to it that its average reaches.
-const SIDE: (usize, usize) = (20, 3);
-/// Fewer points, over which a curved envelope does not look like a jump.
-const NEAR: usize = 8;
-/// Jump of the amplitude over its larger value, and in standard deviations.
-const JUMP: (f64, f64) = (0.1, 8.0);
-/// Periods behind a moment in which the fits are compared.
+/// Number of periods after a restart over which residuals are compared.
 const COMPARED: usize = 8;
-/// What a fit of the later part alone leaves there, over what the fit of the whole does.
+/// Ratio of the residual of the later part, fitted alone, to that of the whole fit there, below which it is clearly smaller.
 const BETTER: f64 = 0.7;
-/// What a fit of both parts may leave of either, over what the later part alone does.
+/// Ratio of residuals up to which they are equal.
 const AS_GOOD: f64 = 1.25;
-/// Periods from the start of a stretch that are moments, too, where the residual of its first half is larger than that of its
-/// last quarter by a factor.
+/// Periods after the start of a segment that are tried as well, and the minimum ratio of the residual in its first half to
+/// that in its last quarter for this.
 const EARLY: [f64; 3] = [1.5, 3.0, 6.0];
 const FALLS: f64 = 1.5;
-/// Difference between a fit that is carried on backwards and the samples, over the fit, from which these do not lead to it.
+/// Minimum ratio of the difference between the samples of the period before and the later fit, extrapolated backwards, to
+/// this fit, above which the earlier part does not lead to the later one.
 const APART: f64 = 1.0;
-/// Relative distance of the frequencies of parts that ring alike.
+/// Relative frequency difference up to which parts ring at the same frequency.
 const ALIKE: f64 = 0.1;
-/// Moments that are tried in a stretch.
-const TRIED: usize = 3;
-/// Moments of all stretches, at most.
+/// Maximum number of modes with which a later part is tried, so that a record full of lines does not take much longer.
+const FEW: usize = 4;
+/// Maximum number of restarts in all segments.
 const MOST: usize = 6;
-/// Fewest samples and periods of a part.
+/// Minimum number of samples and periods of a part.
 const LEAST: (usize, usize) = (40, 4);
 
-/// A moment at which ringing begins anew.
+/// A restart of a decay.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Beginning {
     pub time_s: f64,
-    /// Whether what is before it is ringing, too.
+    /// Whether the part before it is a free decay as well.
     pub rings_before: bool,
 }
 
-/// Cuts the stretches of a fit where ringing begins anew, and fits them again.
+/// Splits the segments of a fit at restarts, and fits them again.
 ///
 /// # Errors
 /// [`FitError`] if there are too few samples.
@@ -80,7 +72,7 @@ pub(super) fn cut<'a>(
     Ok((found, all))
 }
 
-/// A stretch of a fit that may begin anew.
+/// A segment of a fit that may restart.
 struct Cutting<'a, 'b> {
     whole: &'b Attempt<'a>,
     stretches: &'b [Stretch],
@@ -88,29 +80,29 @@ struct Cutting<'a, 'b> {
     search: (&'a ModeSearch, &'a [SteadyLine]),
 }
 
-/// A fit to other stretches.
+/// A fit to other segments.
 type NewFit<'a> = (Attempt<'a>, Vec<Stretch>, Beginning);
 
-/// A moment from which on the ringing alone is fitted clearly better, or as well by fewer modes.
+/// A possible restart: the later part alone is fitted clearly better, or as well with fewer modes.
 struct Onset {
     time_s: f64,
-    /// Samples before it, and the first behind it.
+    /// Number of samples before it, and index of the first after it.
     before: usize,
     behind: usize,
-    /// Samples of a period, and those in which fits are compared.
+    /// Number of samples per period, and of those over which residuals are compared.
     period: usize,
     compared: usize,
-    /// What the fit of the later part leaves there, and the frequency of its strongest mode.
+    /// Residual of the later part fitted alone, and frequency of its strongest mode.
     left: f64,
     frequency_hz: f64,
-    /// Difference between the samples of the period before and that fit, carried on backwards, over the fit.
+    /// Difference between the samples of the period before and that fit, extrapolated backwards, relative to the fit.
     apart: f64,
-    /// Whether it leaves clearly less than the fit of the whole; otherwise it has fewer modes.
+    /// Whether that residual is clearly smaller than that of the whole fit; otherwise there are fewer modes.
     is_better: bool,
 }
 
 impl Onset {
-    /// Residual at the start of what is behind it.
+    /// Rms residual at the start of the later part.
     fn start(&self, residuals: &[f64]) -> f64 {
         rms(&residuals[..self.compared.min(residuals.len())])
     }
@@ -125,7 +117,7 @@ impl<'a> Cutting<'a, '_> {
         &self.stretches[self.place]
     }
 
-    /// The fit with a cut, if one is better: both parts, if they ring alike, or else the later part from the first moment on.
+    /// The fit with a split, if one is better: of both parts if they ring alike, otherwise of the longest later part.
     fn best(&self) -> Result<Option<NewFit<'a>>, FitError> {
         let stretch = self.stretch();
         if !stretch.bands_hz.is_empty() {
@@ -138,7 +130,7 @@ impl<'a> Cutting<'a, '_> {
         });
         let mut moments = Vec::new();
         for period_s in lines.into_iter().flatten() {
-            let mut times_s = moments_s(stretch, period_s);
+            let mut times_s = jumps_s(stretch, period_s);
             if falls(residuals) {
                 times_s.extend(EARLY.map(|periods| periods * period_s));
             }
@@ -163,7 +155,7 @@ impl<'a> Cutting<'a, '_> {
         Ok(None)
     }
 
-    /// A moment, if the ringing behind it is fitted better alone.
+    /// A possible restart at a time, if the later part is fitted better alone.
     fn moment(&self, time_s: f64, period_s: f64) -> Result<Option<Onset>, FitError> {
         let stretch = self.stretch();
         let place = |time_s: f64| stretch.times_s.partition_point(|t| *t < time_s);
@@ -183,7 +175,11 @@ impl<'a> Cutting<'a, '_> {
             return Ok(None);
         }
         let of_whole = &self.whole.fit.residuals[self.place][moment.behind..];
-        let (found, _) = self.search(vec![stretch.later(moment.behind)])?;
+        let few = ModeSearch {
+            most: self.search.0.most.min(FEW),
+            ..*self.search.0
+        };
+        let found = search(&mut vec![stretch.later(moment.behind)], &few, self.search.1)?;
         let Some(main) = found.fit.by_strength(1).first().copied() else {
             return Ok(None);
         };
@@ -205,7 +201,7 @@ impl<'a> Cutting<'a, '_> {
         Ok((moment.is_better || is_simpler).then_some(moment))
     }
 
-    /// Both parts as decays of their own, if what is left of them is alike.
+    /// The fit of both parts as separate decays, if their residuals are equally small.
     fn both(&self, moment: &Onset) -> Result<Option<NewFit<'a>>, FitError> {
         if !moment.is_long(moment.before) {
             return Ok(None);
@@ -225,7 +221,7 @@ impl<'a> Cutting<'a, '_> {
         Ok(is_good.then_some((found, cut, beginning)))
     }
 
-    /// The later part, if the earlier one does not lead to it and does not ring at its frequency.
+    /// The fit of the later part, if the earlier one does not lead to it and does not ring at its frequency.
     fn later(&self, moment: &Onset) -> Result<Option<NewFit<'a>>, FitError> {
         let stretch = self.stretch();
         if moment.apart < APART {
@@ -252,7 +248,7 @@ impl<'a> Cutting<'a, '_> {
         Ok((found, stretches))
     }
 
-    /// The stretches with these in the place of the one.
+    /// The segments with these in place of this one.
     fn with(&self, parts: &[Stretch]) -> Vec<Stretch> {
         let mut all = self.stretches.to_vec();
         all.splice(self.place..=self.place, parts.iter().cloned());
@@ -260,101 +256,8 @@ impl<'a> Cutting<'a, '_> {
     }
 }
 
-/// Whether a residual falls with the ringing.
+/// Whether a residual decays.
 fn falls(residuals: &[f64]) -> bool {
     let count = residuals.len();
     rms(&residuals[..count / 2]) > FALLS * rms(&residuals[count - count / 4..])
-}
-
-/// Times from the start of a stretch at which the amplitude of a line jumps, the clearest first.
-fn moments_s(stretch: &Stretch, period_s: f64) -> Vec<f64> {
-    let points = demodulated(stretch, period_s);
-    let reach = SIDE.0 + SIDE.1;
-    let middles = reach..points.len().saturating_sub(reach);
-    let jumps: Vec<f64> = middles.map(|i| jump(&points, i)).collect();
-    let mut peaks: Vec<(usize, f64)> = Vec::new();
-    let mut rises = false;
-    for (i, jump) in jumps.into_iter().enumerate() {
-        match peaks.last_mut() {
-            Some(peak) if rises && jump > peak.1 => *peak = (i, jump),
-            Some(_) if rises && jump > 0.0 => {}
-            _ if jump > 0.0 => peaks.push((i, jump)),
-            _ => {}
-        }
-        rises = jump > 0.0;
-    }
-    peaks.sort_by(|a, b| b.1.total_cmp(&a.1));
-    peaks.truncate(TRIED);
-    let time_s = |peak: &(usize, f64)| (peak.0 + reach) as f64 * period_s / A_PERIOD as f64;
-    peaks.iter().map(time_s).collect()
-}
-
-/// A stretch times a turn of that period backwards, averaged over the period about each of the points.
-fn demodulated(stretch: &Stretch, period_s: f64) -> Vec<Complex64> {
-    let step_s = period_s / A_PERIOD as f64;
-    let mean = stretch.values.iter().sum::<f64>() / stretch.values.len() as f64;
-    let count = (stretch.times_s.last().unwrap_or(&0.0) / step_s) as usize + 1;
-    let mut sums = vec![(Complex64::ZERO, 0.0); count];
-    for (time_s, value) in stretch.times_s.iter().zip(&stretch.values) {
-        let turn = Complex64::from_polar(1.0, -std::f64::consts::TAU * time_s / period_s);
-        let sum = &mut sums[(time_s / step_s) as usize];
-        sum.0 += turn * (value - mean);
-        sum.1 += 1.0;
-    }
-    let half = A_PERIOD / 2;
-    let over = |i: usize| {
-        let near = &sums[i.saturating_sub(half)..(i + half).min(count)];
-        let total = near
-            .iter()
-            .fold((Complex64::ZERO, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
-        total.0 / f64::max(total.1, 1.0)
-    };
-    (0..count).map(over).collect()
-}
-
-/// By how many standard deviations the amplitude jumps at a point; 0 if by too few or too little.
-fn jump(points: &[Complex64], middle: usize) -> f64 {
-    let [far, near] = [SIDE.0, NEAR].map(|side| Jump::at(points, middle, side));
-    let is_jump = near.part.min(far.part) > JUMP.0 && far.sure > JUMP.1;
-    if is_jump { far.sure } else { 0.0 }
-}
-
-/// A change of the amplitude.
-struct Jump {
-    /// Over the larger amplitude.
-    part: f64,
-    /// In standard deviations.
-    sure: f64,
-}
-
-impl Jump {
-    /// At a point, by so many on either side.
-    fn at(points: &[Complex64], middle: usize, side: usize) -> Self {
-        let before = &points[middle - SIDE.1 - side..=middle - SIDE.1];
-        let after = &points[middle + SIDE.1..=middle + SIDE.1 + side];
-        let pairs = || before.windows(2).chain(after.windows(2));
-        let products: Complex64 = pairs().map(|pair| pair[0].conj() * pair[1]).sum();
-        let ratio = products / pairs().map(|pair| pair[0].norm_sqr()).sum::<f64>();
-        // Exponents are counted from the middle.
-        let fitted = |first: i32, values: &[Complex64]| {
-            let shape = (first..).map(|k| ratio.powi(k)).take(values.len());
-            let pairs: Vec<_> = shape.zip(values).collect();
-            let weight: f64 = pairs.iter().map(|(s, _)| s.norm_sqr()).sum();
-            let product: Complex64 = pairs.iter().map(|(s, z)| s.conj() * *z).sum();
-            let amplitude = product / weight;
-            let left = pairs.iter().map(|(s, z)| (*z - amplitude * s).norm_sqr());
-            (amplitude, weight, left.sum::<f64>())
-        };
-        let from = fitted(-((side + SIDE.1) as i32), before);
-        let to = fitted(SIDE.1 as i32, after);
-        // An average over a period holds so many points, of which one is of its own.
-        let own = A_PERIOD as f64;
-        let freedom = ((before.len() + after.len()) as f64 - 3.0 * own).max(own);
-        let variance = (from.2 + to.2) / freedom * own * (1.0 / from.1 + 1.0 / to.1);
-        let size = (to.0 - from.0).norm();
-        Self {
-            part: size / from.0.norm().max(to.0.norm()),
-            sure: size / variance.sqrt().max(f64::MIN_POSITIVE),
-        }
-    }
 }

@@ -6,6 +6,7 @@ mod baseline;
 mod by_hand;
 mod dependence;
 mod first_period;
+mod jumps;
 mod laws;
 mod modes;
 mod present;

@@ -246,10 +246,12 @@ fn good_hits(
     let apart = (0.05 * rate_hz) as usize;
     let mut good = Vec::new();
     let mut bad = Vec::new();
+    let mut left = 0.0_f64;
     for (r, record) in records.iter().enumerate() {
         let hits = frf::find_hits(record.applied, record.measured, apart);
         for (k, hit) in hits.into_iter().enumerate() {
             if hit.faults.is_empty() {
+                left = left.max(hit.left);
                 if let Some(part) = hit.second {
                     result.warn("second-stroke", second_stroke(record, k, part));
                 }
@@ -274,6 +276,7 @@ fn good_hits(
         );
         return Err(Failure::failed(ErrorCode::TooFewSamples, bad.join("; ")));
     }
+    check::overlapping_hits(result, left);
     for message in bad {
         result.warn("hit-left-out", message);
     }

@@ -161,6 +161,24 @@ pub(super) fn short_pulses(result: &mut Identification, part: f64) {
     }
 }
 
+/// Minimum reported amplitude of a response when the next hit follows, relative to its largest.
+const OVERLAPS: f64 = 0.01;
+
+/// Warns about hits that follow before the response to the previous one has decayed.
+pub(super) fn overlapping_hits(result: &mut Identification, left: f64) {
+    if left > OVERLAPS {
+        result.warn(
+            "hits-overlap",
+            format!(
+                "a response still rings at {} % of its maximum when the next hit follows, which then counts as an effect of \
+                 that hit: constants, and static gain most of all, may be wrong by about as much; wait longer between hits, \
+                 or give --excitation transient with --modes, which evaluates all hits of a record together",
+                rounded(100.0 * left, 2)
+            ),
+        );
+    }
+}
+
 /// Minimum reported error of the gain due to noise in the applied signal.
 const GAIN_ERROR: f64 = 1e-3;
 

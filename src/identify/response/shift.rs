@@ -28,6 +28,8 @@ const AS_GOOD: f64 = 1.001;
 /// Ratio of the error with a delay and fewer modes to that without, up to which the former is preferred to a pole above
 /// the band that does not ring.
 const AS_FEW: f64 = 1.02;
+/// Minimum delay in standard uncertainties.
+const SIGNIFICANT: f64 = 3.0;
 
 /// The fit with a delay, if that explains the response with fewer modes about as well as `coarse` does without: a
 /// delay is not a sum of modes, so many modes are needed to imitate one.
@@ -47,14 +49,14 @@ pub(super) fn of(
         with_delay: true,
         ..data.clone()
     };
-    let slack = match foreign::has_out_of_band(coarse) {
-        true => AS_FEW,
-        false => 1.0,
-    };
+    let has_stand_in = foreign::has_out_of_band(coarse);
+    let slack = if has_stand_in { AS_FEW } else { 1.0 };
     let enough = slack * set.error(&coarse.response, lines);
     for late in with_fewer_modes(&data, coarse.poles.len(), options) {
         let late = late?;
-        if set.error(&late.response, lines) <= enough {
+        let std_s = late.delay_std_s;
+        let is_known = std_s.is_some_and(|std_s| late.delay_s.abs() > SIGNIFICANT * std_s);
+        if (is_known || has_stand_in) && set.error(&late.response, lines) <= enough {
             warn(result, late.delay_s);
             return Ok(Some(late));
         }

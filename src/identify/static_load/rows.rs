@@ -1,25 +1,25 @@
-//! Rows of a table that are not readings one after the other at rest: sorted ones, and those of a logger in which the reading
-//! still settles after each change of the load.
+//! Rows that are not settled readings in order of time: sorted tables, and data loggers whose reading still settles after each
+//! change of the load.
 
 use super::Point;
 use super::steps::is_same_load;
 use crate::identify::{Identification, rms};
 use crate::print::plural;
 
-/// Minimum number of loads in a sorted table, and of rows beyond one per load.
+/// Minimum number of loads of a sorted table, and of rows beyond one per load.
 const SORTED: (usize, usize) = (3, 6);
-/// Minimum number of rows of a load in which settling is looked for, and of loads that show it.
+/// Minimum number of rows at a load for settling to be detectable, and of loads that show it.
 const RUN: usize = 8;
 const LOADS: usize = 3;
-/// Minimum fraction of the rows in such loads.
+/// Minimum fraction of rows at such loads.
 const STEPWISE: f64 = 0.8;
-/// Fraction of the change from load to load by which a first row must lag, and from which a row counts as settled.
+/// Minimum lag of a first row, and maximum lag of a settled one, relative to the change of the reading.
 const LAGS: f64 = 0.1;
 const SETTLED: f64 = 0.01;
-/// The same in standard deviations of the settled rows.
+/// Minimum lag in standard deviations of the settled rows.
 const NOISE: f64 = 5.0;
 
-/// Whether the rows are sorted by load and, within each load, by reading: the order in which they were taken is lost.
+/// Whether the rows are sorted by load and, at each load, by reading, so that their order in time is lost.
 pub(super) fn is_sorted(points: &[Point]) -> bool {
     let runs: Vec<&[Point]> = runs(points).collect();
     let rises = |run: &&[Point]| {
@@ -37,7 +37,7 @@ pub(super) fn is_sorted(points: &[Point]) -> bool {
         && (runs.iter().all(rises) || runs.iter().all(falls))
 }
 
-/// Warns that the order is lost.
+/// Warns about sorted rows.
 pub(super) fn warn_sorted(result: &mut Identification) {
     result.warn(
         "rows-sorted",
@@ -46,7 +46,7 @@ pub(super) fn warn_sorted(result: &mut Identification) {
     );
 }
 
-/// The points without those in which the reading still settles after a change of the load, and the number of these.
+/// The settled points, and the number of those in which the reading still settles after a change of the load.
 pub(super) fn settled(points: &[Point]) -> (Vec<Point>, usize) {
     let runs: Vec<LoadRun> = runs(points).map(LoadRun::of).collect();
     let lags: Vec<usize> = std::iter::once(0)
@@ -68,7 +68,7 @@ pub(super) fn settled(points: &[Point]) -> (Vec<Point>, usize) {
     (kept.collect(), lags.iter().sum())
 }
 
-/// Warns about rows that were left out.
+/// Warns about unsettled rows.
 pub(super) fn warn_unsettled(result: &mut Identification, count: usize) {
     if count > 0 {
         result.warn(
@@ -108,7 +108,7 @@ impl<'a> LoadRun<'a> {
         }
     }
 
-    /// Number of first rows in which the reading is still on its way from the level before; 0 if the first is not.
+    /// Number of first rows in which the reading still settles from the previous level; 0 if the first is settled.
     fn unsettled_after(&self, before: &LoadRun) -> usize {
         let count = self.points.len();
         let jump = self.level - before.level;
@@ -121,7 +121,7 @@ impl<'a> LoadRun<'a> {
             .points
             .iter()
             .position(|p| lag(p) < SETTLED || !is_clear(p));
-        // What is left of the lag is lost in the noise as long again.
+        // The rest of the lag is hidden by noise for about as long.
         (2 * first.unwrap_or(count)).min(count - count / 3)
     }
 }

@@ -18,6 +18,8 @@ pub struct Hit {
     pub faults: Vec<HitFault>,
     /// Force of a double hit's second stroke relative to the first, if any.
     pub second: Option<f64>,
+    /// Amplitude of the response when the next hit follows, relative to its largest; 0 for the last hit.
+    pub left: f64,
 }
 
 /// A fault of a hit.
@@ -115,9 +117,24 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
                 peak: peaks[k],
                 faults,
                 second,
+                left: match k + 1 < starts.len() {
+                    true => ringing_left(&measured[starts[k]..starts[k + 1]], noises[1]),
+                    false => 0.0,
+                },
             }
         })
         .collect()
+}
+
+/// Amplitude of a response in its last twentieth, without noise, relative to its largest.
+fn ringing_left(measured: &[f64], noise: f64) -> f64 {
+    let last = &measured[measured.len() - measured.len().div_ceil(20)..];
+    let level = last.iter().sum::<f64>() / last.len() as f64;
+    let power = last.iter().map(|v| (v - level).powi(2)).sum::<f64>() / last.len() as f64;
+    let largest = measured
+        .iter()
+        .fold(0.0_f64, |m, v| m.max((v - level).abs()));
+    (2.0 * (power - noise * noise).max(0.0)).sqrt() / largest.max(f64::MIN_POSITIVE)
 }
 
 /// The length to which hits are cut: that which keeps most samples of all.
