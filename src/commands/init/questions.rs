@@ -1,14 +1,14 @@
-//! What `init` asks for, by what there is to start from.
+//! Questions of `init`, by source of data.
 
 use torqcomp_model::Kind;
 
-/// One entry of the file: where it goes, how it is asked for, and what it means.
+/// One entry of the file: its place, question and meaning.
 pub(super) struct Question {
     pub(super) section: &'static str,
     pub(super) key: &'static str,
     /// The flag without its dashes.
     pub(super) flag: &'static str,
-    /// The kind of its quantity; `None` where the unit or a list of words says more.
+    /// Kind of its quantity; `None` if the unit or a list of words determines it.
     pub(super) kind: Option<Kind>,
     pub(super) example: &'static str,
     pub(super) meaning: &'static str,
@@ -172,7 +172,7 @@ impl Question {
         )
     }
 
-    /// Whether the file takes a standard uncertainty of it.
+    /// Whether the file accepts its standard uncertainty.
     pub(super) fn has_std(&self) -> bool {
         !matches!(self.key, "layout" | "zero" | "resistance")
     }
@@ -184,7 +184,7 @@ impl Question {
         )
     }
 
-    /// Checks a standard uncertainty of the value that was given.
+    /// Checks the standard uncertainty of the given value.
     pub(super) fn check_std(&self, answer: &str, value: &str) -> Result<(), String> {
         match (answer, self.kind) {
             ("", _) | (_, None) => Ok(()),
