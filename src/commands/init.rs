@@ -75,7 +75,7 @@ impl<R: BufRead, W: Write> Dialogue<R, W> {
             if self.input.read_line(&mut line).map_err(broken)? == 0 {
                 return Err(Failure::failed(
                     ErrorCode::MissingArgument,
-                    "the answers ended before the last question",
+                    "input ended before the last question",
                 ));
             }
             let answer = line.trim().to_owned();
@@ -95,8 +95,8 @@ fn compose<R: BufRead, W: Write>(
     let from = match (args.from, &mut dialogue) {
         (Some(from), _) => from,
         (None, Some(dialogue)) => {
-            let question = "What do you have: a transducer with its papers, a bridge that was calibrated with weights, \
-                            the drawing of the beam, or is it unknown? (transducer, bridge, drawing, unknown)";
+            let question = "What do you have: a transducer with a data sheet or certificate, a bridge calibrated with \
+                            weights, the drawing of the beam, or none of these? (transducer, bridge, drawing, unknown)";
             let known = |text: &str| source(text).map(|_| ());
             source(&dialogue.ask(question, known)?).map_err(Failure::of(ErrorCode::InvalidValue))?
         }
@@ -136,13 +136,13 @@ fn compose<R: BufRead, W: Write>(
     if let Some(flag) = args.given_beside(from) {
         return Err(Failure::usage(
             ErrorCode::ConflictingArguments,
-            format_args!("--{flag} does not belong to --from {}", word(from)),
+            format_args!("--{flag} does not apply to --from {}", word(from)),
         ));
     }
     if !missing.is_empty() {
         return Err(Failure::usage(
             ErrorCode::MissingArgument,
-            format_args!("--from {} needs also {}", word(from), missing.join(", ")),
+            format_args!("--from {} also needs {}", word(from), missing.join(", ")),
         ));
     }
     beyond_loop(&answers)?;
@@ -244,12 +244,12 @@ fn page(args: &Init, from: InitFrom, answers: &[Answer]) -> String {
 }
 
 /// How to obtain `[mechanics]`; FILE is the name of the file.
-const NO_MECHANICS: &str = "\n# [mechanics] is the response that is divided out. Record how the stand rings after a tap, and run\n\
+const NO_MECHANICS: &str = "\n# [mechanics] is the response that is divided out. Record the ringing of the stand after a tap, and run\n\
     #     torqcomp identify decay tap.csv -o FILE\n# or write it by hand:\n\
     # [mechanics]\n# natural_frequency = \"590 Hz\"\n# damping_ratio = 0.02\n";
 /// How to obtain `[calibration]`.
-const NO_CALIBRATION: &str = "\n# [calibration] leads from the record to torque. A record in N m needs none. For one in V, mV/V, mA or Hz load the\n\
-    # stand with known weights, and run\n\
+const NO_CALIBRATION: &str = "\n# [calibration] converts the record to torque. A record in N m needs none. For one in V, mV/V, mA or Hz, load the\n\
+    # stand with known weights and run\n\
     #     torqcomp identify static loads.csv --load LOAD --reading READING --radius \"0.5 m\" -o FILE\n\
     # or write one of these by hand:\n# [calibration]\n# torque_per_volt = \"12.5 N m/V\"\n\
     # torque_per_ratio = \"25 N m/(mV/V)\"\n";
@@ -316,7 +316,7 @@ impl Init {
                 return Err(Failure::usage(
                     ErrorCode::ConflictingArguments,
                     format_args!(
-                        "--std {flag}={std}: --{flag} is not given, or takes no uncertainty"
+                        "--std {flag}={std}: --{flag} is not given, or has no uncertainty"
                     ),
                 ));
             };

@@ -324,8 +324,8 @@ fn static_gain(stand: Option<&Stand>) -> Option<f64> {
     stand?.static_gain().map(|gain| gain.value)
 }
 
-/// Units of the channels, and whether the stand's calibration converts the measured one to torque; `acts`: whether there
-/// is an applied quantity or known loads.
+/// Units of the channels, and whether the stand's calibration converts the measured one to torque; `acts`: whether
+/// there is an applied quantity or known loads.
 fn units(pair: &Pair, stand: Option<&Stand>, acts: bool) -> (ChannelUnits, bool) {
     let channels = [&pair.applied_unit, &pair.measured_unit];
     let [applied_text, measured_text] =

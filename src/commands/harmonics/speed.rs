@@ -92,8 +92,8 @@ pub(super) fn off(
 }
 
 /// A warning if the fundamental differs between parts of the record by more than its uncertainty, and by so much
-/// that the highest order loses its phase. It is estimated from differences over a quarter of the shortest period, where a
-/// load step is a short pulse.
+/// that the highest order loses its phase. It is estimated from differences over a quarter of the shortest period,
+/// where a load step is a short pulse.
 pub(super) fn warning(
     record: &UniformRecord<Spool>,
     fundamental_hz: f64,

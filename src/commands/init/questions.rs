@@ -65,7 +65,7 @@ pub(super) const TRANSDUCER: [Question; 5] = [
         ["calibration", "rated_torque", "rated-torque"],
         Some(Kind::Torque),
         "50 N m",
-        "torque of that change",
+        "torque for this change",
     ),
     EXCITATION,
     GAIN,
@@ -115,7 +115,7 @@ pub(super) const DRAWING: [Question; 12] = [
         ["gage", "gage_factor", "gage-factor"],
         Some(Kind::Ratio),
         "2.05",
-        "of the gage's data sheet",
+        "from the gage's data sheet",
     ),
     needed(
         ["gage", "resistance", "gage-resistance"],
@@ -138,13 +138,13 @@ const EXCITATION: Question = optional(needed(
     ["bridge", "excitation", "excitation"],
     Some(Kind::Voltage),
     "5 V",
-    "supply of the bridge; needed between volts and mV/V",
+    "supply of the bridge; needed to convert between volts and mV/V",
 ));
 const GAIN: Question = optional(needed(
     ["recorder", "gain", "gain"],
     Some(Kind::Gain),
     "200",
-    "recorded volts per bridge volt; needed between volts and mV/V",
+    "recorded volts per bridge volt; needed to convert between volts and mV/V",
 ));
 const ZERO: Question = optional(needed(
     ["recorder", "zero", "zero"],
@@ -162,10 +162,10 @@ impl Question {
         let skip = if self.is_needed {
             ""
         } else {
-            "; Enter to leave it out"
+            "; Enter to skip"
         };
         format!(
-            "{} ({}), as {}{skip}",
+            "{} ({}), such as {}{skip}",
             self.key.replace('_', " "),
             self.meaning,
             self.example
@@ -179,7 +179,7 @@ impl Question {
 
     pub(super) fn std_text(&self) -> String {
         format!(
-            "standard uncertainty of the {} in its unit or in % of it (a limit divided by 1.73); Enter if unknown",
+            "standard uncertainty of the {}, in its unit or in % (for a limit, divide by 1.73); Enter if unknown",
             self.key.replace('_', " ")
         )
     }
@@ -197,7 +197,7 @@ impl Question {
 
     pub(super) fn check(&self, answer: &str) -> Result<(), String> {
         match (answer, self.kind) {
-            ("", _) if self.is_needed => Err(format!("it is needed, as {}", self.example)),
+            ("", _) if self.is_needed => Err(format!("required, such as {}", self.example)),
             ("", _) | (_, None) => Ok(()),
             (text, Some(kind)) => kind
                 .parse(text)
