@@ -244,11 +244,13 @@ fn page(args: &Init, from: InitFrom, answers: &[Answer]) -> String {
 }
 
 /// How to obtain `[mechanics]`; FILE is the name of the file.
-const NO_MECHANICS: &str = "\n# [mechanics] is the response that is divided out. Record the ringing of the stand after a tap, and run\n\
+const NO_MECHANICS: &str = "\n# [mechanics] is the response that is divided out. Record the ringing of the \
+    stand after a tap, and run\n\
     #     torqcomp identify decay tap.csv -o FILE\n# or write it by hand:\n\
     # [mechanics]\n# natural_frequency = \"590 Hz\"\n# damping_ratio = 0.02\n";
 /// How to obtain `[calibration]`.
-const NO_CALIBRATION: &str = "\n# [calibration] converts the record to torque. A record in N m needs none. For one in V, mV/V, mA or Hz, load the\n\
+const NO_CALIBRATION: &str = "\n# [calibration] converts the record to torque. A record in N m needs \
+    none. For one in V, mV/V, mA or Hz, load the\n\
     # stand with known weights and run\n\
     #     torqcomp identify static loads.csv --load LOAD --reading READING --radius \"0.5 m\" -o FILE\n\
     # or write one of these by hand:\n# [calibration]\n# torque_per_volt = \"12.5 N m/V\"\n\
