@@ -43,7 +43,7 @@ pub enum RowKind {
     Message,
 }
 
-/// Location of a failure, as far as known. Numbers count from 1, bytes from 0.
+/// Where a failure is, as far as that is known. Numbers count from 1, bytes from 0.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
 pub struct ErrorPlace {
     /// Name of the file, as given.

@@ -17,7 +17,7 @@ use crate::warning::Warning;
 
 /// Name and version of the schema of a line.
 pub(crate) const SCHEMA: &str = "torqcomp.log/1";
-/// Head of every line.
+/// Beginning of every line.
 pub(crate) const BEGINNING: &str = "{\"schema\":\"torqcomp.log/";
 
 /// The log of this run, if it has one.

@@ -57,10 +57,10 @@ pub(crate) fn document<R: Serialize>(schema: &'static str, report: &R) -> String
     })
 }
 
-/// Head of every JSON document.
+/// How every JSON document begins.
 #[derive(Serialize, JsonSchema)]
 pub(crate) struct Document<'a, R> {
-    /// Name and version of the schema of this document.
+    /// Name and version of the form of this document.
     schema: &'static str,
     /// Version of torqcomp.
     version: &'static str,

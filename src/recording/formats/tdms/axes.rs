@@ -87,7 +87,7 @@ pub(super) fn channels(
         }
         let name = one.name();
         if one.is_times() {
-            left_out.push(format!("\"{name}\" (time stamps without a channel)"));
+            left_out.push(format!("\"{name}\" (time stamps of no other channel)"));
             continue;
         }
         content.warnings.extend(doubts(&one.object, &name));

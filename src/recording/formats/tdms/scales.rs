@@ -243,7 +243,7 @@ impl ScaleKeys<'_> {
         let is_rising = pairs.windows(2).all(|pair| pair[0][0] < pair[1][0]);
         if inputs.len() != outputs.len() || pairs.is_empty() || !is_rising {
             return Err(format!(
-                "scale {}: its table is not monotonic, or inputs and outputs differ in number",
+                "scale {}: the inputs of its table are not monotonic, or differ in number from the outputs",
                 self.number
             ));
         }
