@@ -1,4 +1,4 @@
-//! One number out of a ROS 2 recording in memory, named `mcap/compression/field`.
+//! Reading one number from a ROS 2 recording in memory, named `mcap/compression/field`.
 //!
 //! `cargo bench --bench readers`. The comparison with the Python reader is `benches/peer/mcap_reader.py`.
 

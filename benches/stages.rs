@@ -1,4 +1,4 @@
-//! Each stage of `compensate` alone, named `stage/size`: parse, convert, FFT, format.
+//! Each stage of `compensate` by itself, named `stage/size`: parse, convert, FFT, format.
 //!
 //! `cargo bench --bench stages`. The peer comparison is in `benches/peer`.
 

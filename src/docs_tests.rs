@@ -1,4 +1,4 @@
-//! The pages of `docs/` that are written from the code. `SNAPSHOTS=overwrite cargo test --lib docs_tests` writes them.
+//! Pages of `docs/` generated from the code. `SNAPSHOTS=overwrite cargo test --lib docs_tests` updates them.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ fn project(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
-/// Compares a page with the file, or writes it.
+/// Compares a page with the file, or updates the file.
 fn compare(name: &str, page: &str) {
     let path = project("docs").join(name);
     if std::env::var_os("SNAPSHOTS").is_some_and(|action| action == "overwrite") {
@@ -115,7 +115,7 @@ fn parameter(parameter: &EffectParameter) -> String {
         unit => format!(" in {unit}"),
     };
     let [lower, upper] = match (parameter.reciprocal, parameter.lower, parameter.upper) {
-        // A fit moves the period.
+        // A fit changes the period.
         (true, 0.0, upper) => [upper.recip(), f64::INFINITY],
         (true, lower, upper) => [upper.recip(), lower.recip()],
         (false, lower, upper) => [lower, upper],
@@ -132,7 +132,7 @@ fn parameter(parameter: &EffectParameter) -> String {
     format!("`{}`{unit}, {range}{scale}", parameter.name)
 }
 
-/// What the bounds of a parameter are multiples of.
+/// Scale of the bounds of a parameter.
 fn scale(parameter: &EffectParameter) -> String {
     let (size, time, frequency) = match parameter.scale {
         ParameterScale::Motion => ("rms", "1/w0", "f0"),
@@ -197,7 +197,7 @@ fn takes_text(takes: Takes) -> String {
     }
 }
 
-/// A stand with every section; `BEAM` and `PART` stand for the variants.
+/// A stand with every section; `BEAM` and `PART` are placeholders for the variants.
 const COMPLETE: &str = r#"schema = "torqcomp.stand/1"
 [mechanics]
 inertia = "1 kg m^2"
@@ -246,7 +246,7 @@ torque = "1 N m"
 reading = "2 V"
 torque = "2 N m""#;
 
-/// The keys that reading asks for in a section: those which the refusal of an unknown key lists.
+/// The keys accepted in a section: those listed when an unknown key is rejected.
 fn asked(title: &str) -> Vec<String> {
     let variants = [
         (
@@ -425,7 +425,7 @@ fn keys(schema: &Value, place: &str, rows: &mut Vec<String>) {
     }
 }
 
-/// Types that a value may have.
+/// Allowed types of a value.
 fn types(schema: &Value) -> String {
     if let Some(name) = schema["const"].as_str() {
         return format!("`{name}`");

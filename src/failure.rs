@@ -1,4 +1,4 @@
-//! How a command can end badly, and the exit code that goes with it.
+//! Failures of a command and their exit codes.
 
 mod code;
 
@@ -12,27 +12,27 @@ use serde::Serialize;
 
 pub use code::ErrorCode;
 
-/// Why a command did not do its work.
+/// Reason why a command failed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Failure {
-    /// The command line asks for something that cannot be: exit code 2.
+    /// Invalid command line: exit code 2.
     Usage(Box<Fault>),
     /// The work failed: exit code 1.
     Failed(Box<Fault>),
-    /// Nobody reads the output any more: exit code 0.
+    /// The reader of the output has closed it: exit code 0.
     ClosedPipe,
 }
 
-/// What went wrong, and where.
+/// Fault and its location.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fault {
     code: ErrorCode,
     place: ErrorPlace,
-    /// What is wrong; behind the first semicolon, what to do.
+    /// The fault; after the first semicolon, the remedy.
     message: String,
 }
 
-/// What the rows of a record are.
+/// Kind of the rows of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RowKind {
     /// Lines of a text.
@@ -113,7 +113,7 @@ impl Failure {
         Self::Failed(Fault::new(code, message))
     }
 
-    /// A failure of the work that another error explains.
+    /// A failure of the work caused by another error.
     pub fn of<E: fmt::Display>(code: ErrorCode) -> impl Fn(E) -> Self {
         move |error| Self::failed(code, error)
     }
@@ -140,7 +140,7 @@ impl Failure {
         }
     }
 
-    /// A failure to read on in a file whose name is said elsewhere.
+    /// A failure to continue reading a file whose name is added elsewhere.
     pub fn unreadable(error: &io::Error) -> Self {
         let code = match error.kind() {
             io::ErrorKind::InvalidData => ErrorCode::DamagedFile,
@@ -172,7 +172,7 @@ impl Failure {
         }
     }
 
-    /// The same failure in a file, unless it is known to be in another one.
+    /// The same failure in a file, unless its file is already known.
     #[must_use]
     pub fn at(self, file: impl fmt::Display) -> Self {
         self.with(|place| {
@@ -192,7 +192,7 @@ impl Failure {
         self.with(|place| place.sample = Some(sample))
     }
 
-    /// The same failure with more known of its place.
+    /// The same failure with a more precise location.
     #[must_use]
     pub(crate) fn with(mut self, change: impl FnOnce(&mut ErrorPlace)) -> Self {
         if let Self::Usage(fault) | Self::Failed(fault) = &mut self {
@@ -201,7 +201,7 @@ impl Failure {
         self
     }
 
-    /// What kind of failure it is; `None` of a closed pipe.
+    /// Kind of failure; `None` for a closed pipe.
     #[must_use]
     pub fn code(&self) -> Option<ErrorCode> {
         match self {
@@ -210,7 +210,7 @@ impl Failure {
         }
     }
 
-    /// The JSON document of the failure; `None` of a closed pipe.
+    /// JSON document of the failure; `None` for a closed pipe.
     #[must_use]
     pub fn document(&self) -> Option<ErrorDocument<'_>> {
         match self {
@@ -242,7 +242,7 @@ impl Fault {
     }
 }
 
-/// Name and version of the document of a failure.
+/// Name and version of the failure document.
 pub const SCHEMA: &str = "torqcomp.error/1";
 
 /// A failure, printed in place of a report.
@@ -266,7 +266,7 @@ pub struct ErrorReport<'a> {
     hint: Option<&'a str>,
 }
 
-/// What is wrong, and what to do: the two sides of the first semicolon outside quotation marks and parentheses.
+/// Fault and remedy: the text before and after the first semicolon outside quotation marks and parentheses.
 fn what_and_hint(message: &str) -> (&str, Option<&str>) {
     let (mut is_quoted, mut depth) = (false, 0_usize);
     for (i, c) in message.char_indices() {
@@ -306,7 +306,7 @@ impl From<torqcomp_model::fit::FitError> for Failure {
     }
 }
 
-/// The known name nearest to a wrong one, as a sentence for the end of a message.
+/// The known name closest to a wrong one, as a sentence to end a message.
 #[must_use]
 pub fn did_you_mean<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let wrong = wrong.to_lowercase();

@@ -1,13 +1,13 @@
-//! Names of files as texts. On Unix they are bytes, which need not be UTF-8.
+//! File names as text. On Unix they are bytes, not necessarily UTF-8.
 
 use std::fmt;
 use std::path::{Component, Path, PathBuf};
 
-/// A path as a text, from which [`path_of`] makes the path again: `\xE4` is a byte that is no UTF-8. A backslash in front of
-/// what looks like such a byte is `\x5C`.
+/// A path as text, which [`path_of`] converts back: `\xE4` is a byte that is not UTF-8. A backslash before
+/// such a sequence in the name itself is `\x5C`.
 pub(crate) struct Shown<'a>(&'a Path);
 
-/// Paths that have a text.
+/// Paths with a text form.
 pub(crate) trait ShowPath {
     /// The text of the path.
     fn shown(&self) -> Shown<'_>;
@@ -48,7 +48,7 @@ impl fmt::Display for Shown<'_> {
     }
 }
 
-/// The byte that `\xE4` at the beginning of a text stands for.
+/// The byte denoted by `\xE4` at the beginning of a text.
 #[cfg(unix)]
 fn byte_of(text: &[u8]) -> Option<u8> {
     let [b'\\', b'x', high, low, ..] = text else {
@@ -97,7 +97,7 @@ pub(crate) fn path_of_bytes(bytes: &[u8]) -> Option<PathBuf> {
     std::str::from_utf8(bytes).ok().map(PathBuf::from)
 }
 
-/// The text of the names in a path, separated by `/` on every system.
+/// Text of the names in a path, separated by `/` on every system.
 pub(crate) fn with_slashes(path: &Path) -> String {
     let names = path.components().filter_map(|part| match part {
         Component::Normal(name) => Some(name.shown().to_string()),
@@ -106,7 +106,7 @@ pub(crate) fn with_slashes(path: &Path) -> String {
     names.collect::<Vec<_>>().join("/")
 }
 
-/// Whether a path ends as that of a folder does.
+/// Whether a path ends like that of a folder.
 pub(crate) fn ends_with_separator(path: &Path) -> bool {
     let last = path.as_os_str().as_encoded_bytes().last();
     last.is_some_and(|byte| std::path::is_separator(char::from(*byte)))
@@ -117,12 +117,12 @@ pub(crate) fn is_dash(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// Texts of paths, separated by commas.
+/// Paths as text, separated by commas.
 pub(crate) fn list(paths: &[PathBuf]) -> String {
     texts(paths).join(", ")
 }
 
-/// The text of each path.
+/// Text of each path.
 pub(crate) fn texts(paths: &[PathBuf]) -> Vec<String> {
     paths.iter().map(|path| path.shown().to_string()).collect()
 }
@@ -151,7 +151,7 @@ mod tests {
 
     #[test]
     fn no_two_names_have_the_same_text() {
-        // Names of up to four bytes out of those that take part in a text.
+        // Names of up to four of the bytes that matter in a text.
         let alphabet = [b'\\', b'x', b'E', b'4', b'5', b'C', 0xE4, b'/'];
         let mut texts = std::collections::HashMap::new();
         let mut names: Vec<Vec<u8>> = vec![Vec::new()];

@@ -54,7 +54,7 @@ pub fn run() -> ExitCode {
     ExitCode::from(logged(code))
 }
 
-/// Says what kept the command from being done; the exit code.
+/// Prints the failure of the command; returns the exit code.
 fn failed(failure: &failure::Failure) -> u8 {
     let code = failure.exit_code();
     if code != 0 {
@@ -65,7 +65,7 @@ fn failed(failure: &failure::Failure) -> u8 {
     code
 }
 
-/// Ends the log; the exit code of a run that would have ended with this one.
+/// Ends the log; returns the exit code of a run that would otherwise end with this one.
 fn logged(code: u8) -> u8 {
     match log::end(code) {
         Ok(()) => code,
@@ -76,23 +76,23 @@ fn logged(code: u8) -> u8 {
     }
 }
 
-/// Says what clap has to say, and how that ends: help and version with 0, wrong usage with 2.
+/// Prints clap's output; returns the exit code: 0 for help and version, 2 for wrong usage.
 fn stopped_by(stopped: &clap::Error) -> ExitCode {
     let failure = cli::wrong_usage(stopped);
     match &failure {
-        // clap does not say which argument it is.
+        // clap does not name the argument.
         Some(failure) if stopped.kind() == clap::error::ErrorKind::InvalidUtf8 => {
             print::say(&format!("torqcomp: {failure}\n"));
         }
         _ => {
-            // Nobody may be there to read it.
+            // The stream may be closed.
             let _ = stopped.print();
         }
     }
     let Some(failure) = failure else {
         return ExitCode::SUCCESS;
     };
-    // The words of the usage are the ones to say; that the log cannot be written as well would hide them.
+    // Report the usage error; an additional failure to write the log would hide it.
     if cli::log_asked().is_some_and(|path| log::begin(&path).is_ok()) {
         log::failure(&failure);
     }
@@ -100,13 +100,13 @@ fn stopped_by(stopped: &clap::Error) -> ExitCode {
     ExitCode::from(logged(failure.exit_code()))
 }
 
-/// Prints a failure as a JSON document where a report was asked for as one and did not appear.
+/// Prints a failure as a JSON document if a JSON report was requested and not printed.
 fn print_document(failure: &failure::Failure) {
     if let Some(document) = failure.document()
         && cli::is_json_asked()
         && !io::output::is_stdout_used()
     {
-        // The failure itself is the one that the exit code tells of.
+        // The exit code is that of the original failure.
         let _ = io::output::print(&print::document(failure::SCHEMA, &document));
     }
 }

@@ -1,4 +1,4 @@
-//! What runs did: a file of JSON lines, one for each event, that any number of runs append to.
+//! Log of runs: a file of JSON lines, one per event, to which any number of runs append.
 
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -15,9 +15,9 @@ use crate::print;
 use crate::recording::moment::utc;
 use crate::warning::Warning;
 
-/// Name and version of a line.
+/// Name and version of the schema of a line.
 pub(crate) const SCHEMA: &str = "torqcomp.log/1";
-/// How every line begins.
+/// Beginning of every line.
 pub(crate) const BEGINNING: &str = "{\"schema\":\"torqcomp.log/";
 
 /// The log of this run, if it has one.
@@ -85,7 +85,7 @@ fn log() -> MutexGuard<'static, Option<Log>> {
 }
 
 impl Log {
-    /// Writes events; the first failure to do so is kept for the end.
+    /// Writes events; the first failure is kept for the end.
     fn append<'a>(&mut self, events: impl IntoIterator<Item = LogEvent<'a>>) {
         let time = now();
         let line = |event| LogLine {
@@ -105,7 +105,7 @@ impl Log {
     }
 }
 
-/// Begins the log of this run.
+/// Starts the log of this run.
 ///
 /// # Errors
 /// If it cannot be written.
@@ -133,7 +133,7 @@ pub(crate) fn begin(path: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Notes warnings, of a recording among many or of the only one.
+/// Logs warnings about one of many recordings or the only one.
 pub(crate) fn warnings(file: Option<&str>, warnings: &[Warning]) {
     if let Some(log) = log().as_mut()
         && !warnings.is_empty()
@@ -146,7 +146,7 @@ pub(crate) fn warnings(file: Option<&str>, warnings: &[Warning]) {
     }
 }
 
-/// Notes a failure, of the run or of a recording among many.
+/// Logs a failure of the run or of one of many recordings.
 pub(crate) fn failure(failure: &Failure) {
     if let (Some(log), Some(document)) = (log().as_mut(), failure.document()) {
         log.append([LogEvent::Failure {
@@ -155,7 +155,7 @@ pub(crate) fn failure(failure: &Failure) {
     }
 }
 
-/// Notes the end of the run.
+/// Logs the end of the run.
 ///
 /// # Errors
 /// If an event could not be written.

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-/// The allocator of musl has one lock for all threads.
+/// The musl allocator has a single lock for all threads.
 #[cfg(target_env = "musl")]
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;

@@ -1,4 +1,4 @@
-//! How a run of a verb ended well, and what it made.
+//! Successful outcome of a verb, and its results.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -8,12 +8,12 @@ use crate::io::output::{self, Output};
 use crate::warning::Warning;
 use crate::{log, print};
 
-/// How a command ended well.
+/// Successful outcome of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// All was done.
+    /// Complete.
     Done,
-    /// It was done, but data were lost, or `--strict` made a warning count.
+    /// Done, but data were lost, or a warning counts under `--strict`.
     WithLoss,
 }
 
@@ -47,7 +47,7 @@ pub(crate) struct RecordFigures {
     pub(crate) noise_rms: Option<f64>,
 }
 
-/// What a verb made of one record. The outputs are complete and get their names in [`Made::publish`].
+/// Results of a verb for one record. The outputs are complete; [`Made::publish`] gives them their names.
 pub(crate) struct Made {
     pub(crate) outputs: Vec<Output>,
     /// JSON document for standard output.
@@ -62,7 +62,7 @@ pub(crate) struct Made {
 }
 
 impl Made {
-    /// Names the outputs and says what is to be said.
+    /// Names the outputs and prints the messages.
     ///
     /// # Errors
     /// As [`Output::write`].

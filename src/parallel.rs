@@ -1,22 +1,22 @@
-//! Work that is shared among threads, with results that do not depend on how many there are.
+//! Work shared among threads; results do not depend on the number of threads.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{LazyLock, Mutex};
 
-/// Threads beyond which sharing pays no more.
+/// Number of threads beyond which more bring no gain.
 const MOST_THREADS: usize = 8;
 
-/// Threads that the machine has for one job.
+/// Threads available for one job.
 #[must_use]
 pub fn threads() -> usize {
     cores().min(MOST_THREADS)
 }
 
-/// Cores that this process may use: as many as Slurm gives the task, and no more than the system (its cgroup included) has.
+/// Cores available to this process: those that Slurm assigns to the task, limited by the system (including its cgroup).
 #[must_use]
 pub fn cores() -> usize {
-    // Linux reads files of the cgroup to tell.
+    // On Linux, this reads files of the cgroup.
     static SYSTEM: LazyLock<usize> =
         LazyLock::new(|| std::thread::available_parallelism().map_or(1, usize::from));
     let system = *SYSTEM;
@@ -27,7 +27,7 @@ pub fn cores() -> usize {
         .map_or(system, |count| count.min(system))
 }
 
-/// Runs a job for each part of so many things, at most `most` of them together; results in their order.
+/// Runs a job for each part of a number of items, with at most `most` items per part; results in order.
 pub fn in_parts<T: Send>(
     count: usize,
     most: usize,
@@ -39,7 +39,7 @@ pub fn in_parts<T: Send>(
     })
 }
 
-/// Runs jobs on all threads; results in the order of the jobs.
+/// Runs jobs on all threads; results in job order.
 pub fn parallel<T: Send>(count: usize, threads: usize, run: impl Fn(usize) -> T + Sync) -> Vec<T> {
     if threads.min(count) < 2 {
         return (0..count).map(run).collect();

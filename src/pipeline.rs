@@ -5,37 +5,37 @@
 //! serial   parallel    serial   parallel serial
 //! ```
 //!
-//! The serial stages see the jobs in order, so what is delivered, and the first error that `join`
-//! finds, are the same with any number of threads. Every thread takes whatever job is nearest to the end. Jobs are reused,
+//! The serial stages see the jobs in order, so the delivered results, and the first error that `join`
+//! finds, do not depend on the number of threads. Every thread takes the job nearest to the end. Jobs are reused,
 //! so their buffers are allocated once, and their number bounds the memory.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-/// The stages of a stream of jobs `J`; `E` is what stops it, `S` what each thread owns.
+/// The stages of a stream of jobs `J`; `E`: error that stops it, `S`: scratch of each thread.
 pub struct Stages<'a, J, S, E> {
     /// Fills a job; `false` at the end of the stream.
     pub read: Box<Serial<'a, J, bool, E>>,
-    /// Does what needs no neighbour.
+    /// Work on a job that needs no neighbours.
     pub prepare: Box<dyn Fn(&mut J) + Sync + 'a>,
-    /// Takes jobs in order (`None` at the end) and hands on those that are complete, in order.
+    /// Takes jobs in order (`None` at the end) and passes on the complete ones, in order.
     pub join: Box<Join<'a, J, E>>,
-    /// Does what needs neighbours, with the thread's own scratch.
+    /// Work that needs neighbours, with the thread's own scratch.
     pub work: Box<WithScratch<'a, S, J>>,
     /// Takes the finished jobs in order.
     pub deliver: Box<Serial<'a, J, (), E>>,
 }
 
-/// A stage that sees one job after the other.
+/// A serial stage.
 type Serial<'a, J, T, E> = dyn FnMut(&mut J) -> Result<T, E> + Send + 'a;
 
-/// A stage that any thread runs, with scratch of its own.
+/// A stage run by any thread, with the thread's own scratch.
 type WithScratch<'a, S, J> = dyn Fn(&mut S, &mut J) + Sync + 'a;
 
-/// Takes a job and hands on others.
+/// Takes a job and passes on others.
 type Join<'a, J, E> = dyn FnMut(Option<J>, &mut dyn FnMut(J)) -> Result<(), E> + Send + 'a;
 
-/// The stages and their state, as all threads see them.
+/// The stages and their state, shared by all threads.
 struct SharedStages<'a, J, S, E> {
     state: Mutex<State<J, E>>,
     changed: Condvar,
@@ -58,12 +58,12 @@ struct State<J, E> {
     reading: bool,
     joining: bool,
     delivering: bool,
-    /// Jobs inside a stage right now.
+    /// Number of jobs currently inside a stage.
     busy: usize,
     read_all: bool,
     joined_all: bool,
     error: Option<E>,
-    /// A stage has panicked: nobody is to wait for its job.
+    /// Whether a stage has panicked, so that no thread waits for its job.
     panicked: bool,
 }
 
@@ -75,9 +75,9 @@ enum Task<J> {
     Leave,
 }
 
-/// Runs the stages on `scratch.len()` threads with `jobs` jobs to start with.
+/// Runs the stages on `scratch.len()` threads, initially with `jobs` jobs.
 ///
-/// More jobs are made when all of them wait in `join`; that happens only if a job needs more
+/// More jobs are created when all of them wait in `join`; this happens only if a job needs more
 /// followers than there are jobs.
 pub fn run<J, S, E>(jobs: usize, scratch: Vec<S>, stages: Stages<J, S, E>) -> Result<(), E>
 where
@@ -111,7 +111,7 @@ where
 }
 
 impl<J: Default, S, E> SharedStages<'_, J, S, E> {
-    /// Takes tasks until there are no more.
+    /// Runs tasks until none are left.
     fn run(&self, mut own: S) {
         let _release = ReleaseOthers(&self.state, &self.changed);
         loop {
@@ -191,7 +191,7 @@ impl<J: Default, S, E> SharedStages<'_, J, S, E> {
     }
 }
 
-/// Lets the other threads leave when the thread that holds it panics.
+/// Releases the other threads if the owning thread panics.
 struct ReleaseOthers<'a, J, E>(&'a Mutex<State<J, E>>, &'a Condvar);
 
 impl<J, E> Drop for ReleaseOthers<'_, J, E> {
@@ -203,7 +203,7 @@ impl<J, E> Drop for ReleaseOthers<'_, J, E> {
     }
 }
 
-/// A panicking stage is passed on by the scope; the lock itself is not at fault.
+/// The scope propagates the panic of a stage; the poisoned lock itself can be used.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -230,7 +230,7 @@ impl<J: Default, E> State<J, E> {
         }
     }
 
-    /// The task nearest to the end of the line; `None` if there is nothing to do right now.
+    /// The task nearest to the end of the pipeline; `None` if there is nothing to do at the moment.
     fn take(&mut self) -> Option<Task<J>> {
         if self.panicked
             || self.error.is_some()

@@ -1,4 +1,4 @@
-//! Numbers, columns and documents as they are printed.
+//! Formatting of numbers, columns and documents for output.
 
 use std::fmt;
 use std::io::Write;
@@ -13,7 +13,7 @@ use crate::io::digits;
 /// A JSON document, indented, with a line end.
 ///
 /// # Panics
-/// Never: the reports have string keys and no failing parts.
+/// Never: all keys of the reports are strings, and no part fails to serialise.
 #[must_use]
 pub fn json(report: &impl Serialize) -> String {
     escaped(serde_json::to_string_pretty(report))
@@ -31,7 +31,7 @@ fn escaped(text: serde_json::Result<String>) -> String {
     text
 }
 
-/// What a verb found, printed as text for people or as a JSON document.
+/// Result of a verb, printed as text for people or as a JSON document.
 pub(crate) trait Report: Serialize + Sized {
     /// Name and version of the document.
     const SCHEMA: &'static str;
@@ -39,7 +39,7 @@ pub(crate) trait Report: Serialize + Sized {
     /// The report for people.
     fn text(&self) -> String;
 
-    /// The report in the form asked for.
+    /// The report in the requested form.
     fn document(&self, as_json: bool) -> String {
         match as_json {
             true => document(Self::SCHEMA, self),
@@ -48,7 +48,7 @@ pub(crate) trait Report: Serialize + Sized {
     }
 }
 
-/// A JSON document, which begins with its schema and the version of torqcomp.
+/// A JSON document, headed by its schema and the version of torqcomp.
 pub(crate) fn document<R: Serialize>(schema: &'static str, report: &R) -> String {
     json(&Document {
         schema,
@@ -68,7 +68,7 @@ pub(crate) struct Document<'a, R> {
     report: &'a R,
 }
 
-/// Says something to a person on standard error. Nobody may be there to read it: that is no failure.
+/// Prints a message to standard error. A closed standard error is not a failure.
 pub fn say(text: &str) {
     if text.is_empty() {
         return;
@@ -78,43 +78,43 @@ pub fn say(text: &str) {
     say_line(&text);
 }
 
-/// Says a text on standard error as it is.
+/// Prints a text to standard error unchanged.
 pub(crate) fn say_line(text: &str) {
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
 
-/// Whether a line that will be taken away stands on the terminal.
+/// Whether the terminal shows a temporary line.
 static IS_LINE_SHOWN: AtomicBool = AtomicBool::new(false);
 
-/// Shows a line on the terminal in the place of the last such line, until something else is said.
+/// Shows a temporary line on the terminal in place of the previous one, until the next message.
 pub(crate) fn show_line(text: String) {
     IS_LINE_SHOWN.store(true, Ordering::Relaxed);
     say_line(&format!("\r{}\x1b[K", visible(text)));
 }
 
-/// Takes the line away.
+/// Erases the temporary line.
 pub(crate) fn clear_line() {
     if IS_LINE_SHOWN.swap(false, Ordering::Relaxed) {
         say_line("\r\x1b[K");
     }
 }
 
-/// Whether notes are left out.
+/// Whether notes are suppressed.
 static IS_QUIET: AtomicBool = AtomicBool::new(false);
 
-/// Leaves notes out from now on, or not.
+/// Suppresses or enables notes.
 pub(crate) fn set_quiet(is_quiet: bool) {
     IS_QUIET.store(is_quiet, Ordering::Relaxed);
 }
 
-/// Says something that `--quiet` leaves out.
+/// Prints a note, which `--quiet` suppresses.
 pub(crate) fn note(text: &str) {
     if !IS_QUIET.load(Ordering::Relaxed) {
         say(text);
     }
 }
 
-/// A text whose control characters are written out: names out of a file can neither steer a terminal nor break a page.
+/// A text with its control characters escaped: names from a file can neither control a terminal nor break a page.
 ///
 /// ```
 /// use torqcomp::print::visible;
@@ -128,7 +128,7 @@ pub fn visible(text: String) -> String {
 }
 
 fn written_out(text: String, written: impl Fn(char) -> String) -> String {
-    // Controls, what changes the direction of text, and what XML does not allow.
+    // Control characters, those that change the text direction, and those not allowed in XML.
     let is_hidden = |c: char| {
         c.is_control() && !matches!(c, '\n' | '\t')
             || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{fffe}' | '\u{ffff}')
@@ -143,7 +143,7 @@ fn written_out(text: String, written: impl Fn(char) -> String) -> String {
     text.chars().map(shown).collect()
 }
 
-/// Relative amount from which on percent are hard to read.
+/// Relative amount from which percentages are hard to read.
 const LARGE_RELATIVE: f64 = 10.0;
 
 /// A number for people: six significant digits.
@@ -152,13 +152,13 @@ pub fn short(value: f64) -> String {
     digits::text(value, 6)
 }
 
-/// A number for people with that many significant digits.
+/// A number for people with the given number of significant digits.
 #[must_use]
 pub fn rounded(value: f64, digits: u32) -> String {
     digits::text(value, digits)
 }
 
-/// A relative amount for people, with that many significant digits: in percent, and as a factor from ten on.
+/// A relative amount for people with the given number of significant digits: in percent, or from ten on as a factor.
 ///
 /// ```
 /// use torqcomp::print::relative;
@@ -174,8 +174,8 @@ pub fn relative(ratio: f64, digits: u32) -> String {
     }
 }
 
-/// A value with its standard uncertainty, which has two significant digits; the value ends with the same digit
-/// (GUM, JCGM 100:2008, 7.2.6). Powers of ten stand behind both where the value is far from one.
+/// A value with its standard uncertainty of two significant digits, rounded to the same digit
+/// (GUM, JCGM 100:2008, 7.2.6). Values far from one get a common power of ten.
 ///
 /// ```
 /// use torqcomp::print::with_std;
@@ -193,13 +193,13 @@ pub fn with_std(value: f64, std: f64) -> String {
     }
 }
 
-/// The same as two texts, for columns.
+/// The value and its uncertainty as two texts, for columns.
 #[must_use]
 pub fn value_and_std(value: f64, std: f64) -> [String; 2] {
     if !(value.is_finite() && std.is_finite() && std > 0.0) {
         return [rounded(value, 6), rounded(std, 2)];
     }
-    // Exponent of the second digit of the uncertainty, once it is rounded to two.
+    // Exponent of the second digit of the uncertainty after rounding to two.
     let exponent = |std: f64| std.log10().floor() as i32 - 1;
     let first = exponent(std);
     let last = exponent((std / 10_f64.powi(first)).round() * 10_f64.powi(first) * (1.0 + 1e-9));
@@ -214,7 +214,7 @@ pub fn value_and_std(value: f64, std: f64) -> [String; 2] {
     let scale = 10_f64.powi(-power);
     let text = |number: f64| {
         let scaled = number * scale;
-        // Decimals are rounded by the formatter, what stands before the point here.
+        // The formatter rounds decimals; digits before the point are rounded here.
         let shown = if decimals > 0 {
             scaled
         } else {
@@ -228,7 +228,7 @@ pub fn value_and_std(value: f64, std: f64) -> [String; 2] {
     [text(value), text(std)]
 }
 
-/// A count with its noun, which takes an s (or es) behind any number but one.
+/// A count with its noun, in the plural (s or es) unless the count is one.
 ///
 /// ```
 /// use torqcomp::print::plural;
@@ -249,7 +249,7 @@ pub(crate) fn list(items: impl IntoIterator<Item = String>) -> String {
     enumeration(&items.into_iter().collect::<Vec<_>>(), "or")
 }
 
-/// `a, b and c`, with that word before the last.
+/// `a, b and c`, with the given word before the last item.
 pub(crate) fn enumeration<T: AsRef<str>>(items: &[T], word: &str) -> String {
     let items: Vec<&str> = items.iter().map(T::as_ref).collect();
     match items.as_slice() {
@@ -259,7 +259,7 @@ pub(crate) fn enumeration<T: AsRef<str>>(items: &[T], word: &str) -> String {
     }
 }
 
-/// A unit for people, also where a file says none.
+/// A unit for people, also if the file gives none.
 #[must_use]
 pub fn unit_or_as_recorded(unit: &str) -> &str {
     match unit {
@@ -279,7 +279,7 @@ pub fn unit_of_quotient((over, under): (&str, &str)) -> String {
     format!("{}/{under}", one(over))
 }
 
-/// Rows of cells as columns of equal width, the first to the left, the others to the right.
+/// Rows of cells as aligned columns, the first aligned left, the others right.
 #[must_use]
 pub fn columns(rows: &[Vec<String>]) -> String {
     let count = rows.iter().map(Vec::len).max().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! How far the work has got, said on standard error: a line on a terminal, or JSON lines for programs.
+//! Progress on standard error: a line on a terminal, or JSON lines for programs.
 
 use std::io::{self, IsTerminal};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -10,24 +10,24 @@ use serde::Serialize;
 use crate::cli::ProgressMode;
 use crate::print;
 
-/// Time after which a terminal shows it.
+/// Delay before progress is shown on a terminal.
 const BEGINS: Duration = Duration::from_secs(2);
-/// Time until it is said again.
+/// Interval between progress lines.
 const REPEATS: Duration = Duration::from_millis(500);
 
-/// Name and version of the form of a line.
+/// Name and version of the schema of a line.
 pub(crate) const SCHEMA: &str = "torqcomp.progress/1";
 
-/// How and when it is said in this process.
+/// Progress output of this process.
 struct Display {
     style: Option<Style>,
-    /// When it was said last.
+    /// Time of the last progress line.
     last: Option<Instant>,
-    /// Whether recordings are counted, so that nothing is said of each of them.
+    /// Whether recordings are counted, so that none has progress lines of its own.
     counts_recordings: bool,
 }
 
-/// How it is said.
+/// Form of progress output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Style {
     Line,
@@ -44,7 +44,7 @@ fn display() -> MutexGuard<'static, Display> {
     DISPLAY.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Settles how it is said. `--quiet` leaves it out, unless a program asks for it.
+/// Chooses the form of progress output. `--quiet` suppresses it, except for programs.
 pub(crate) fn choose(mode: Option<ProgressMode>, is_quiet: bool) {
     let is_for_people = !is_quiet && io::stderr().is_terminal();
     display().style = match mode.unwrap_or(ProgressMode::Auto) {
@@ -54,18 +54,18 @@ pub(crate) fn choose(mode: Option<ProgressMode>, is_quiet: bool) {
     };
 }
 
-/// What takes long.
+/// Kind of long task.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Task {
-    /// A file is read.
+    /// Reading a file.
     Read(String),
-    /// Many recordings are worked on.
+    /// Processing many recordings.
     Recordings,
-    /// Models are fitted.
+    /// Fitting models.
     Fits,
 }
 
-/// How much there is, or is done: things that are counted, and bytes.
+/// Amount of work, total or done: number of items, and bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Amount {
     pub(crate) count: u64,
@@ -84,7 +84,7 @@ impl Amount {
         }
     }
 
-    /// Which part of a whole this is: of its bytes, or of what is counted if it has none.
+    /// Fraction of a total: of its bytes, or of its items if it has none.
     fn share_of(self, all: Self) -> Option<f64> {
         let (part, whole) = match all.bytes {
             0 => (self.count, all.count),
@@ -94,7 +94,7 @@ impl Amount {
     }
 }
 
-/// A task that is under way.
+/// A task in progress.
 pub(crate) struct Progress {
     task: Task,
     begun: Instant,
@@ -111,7 +111,7 @@ impl Progress {
         }
     }
 
-    /// Says how much is done of how much, if it is time to.
+    /// Prints the amount done and the total, if due.
     pub(crate) fn report(&self, done: Amount, all: Option<Amount>) {
         let mut display = display();
         let Some(style) = display.style else {
@@ -133,7 +133,7 @@ impl Progress {
         display.last = Some(Instant::now());
     }
 
-    /// The line for people; `None` while there is nothing to say.
+    /// The line for people; `None` as long as there is nothing to report.
     fn text(&self, elapsed: Duration, done: Amount, all: Option<Amount>) -> Option<String> {
         let all = all?;
         let share = done.share_of(all)?;
@@ -216,13 +216,13 @@ pub(crate) struct ProgressLine<'a> {
     seconds_left: Option<f64>,
 }
 
-/// Whether it is time to say it, so long after the task began and after it was said last.
+/// Whether a line is due, given the times since the start of the task and since the last line.
 fn is_due(style: Style, elapsed: Duration, since: Option<Duration>) -> bool {
     let has_begun = style == Style::Json || elapsed >= BEGINS;
     has_begun && since.is_none_or(|since| since >= REPEATS)
 }
 
-/// Recordings and megabytes a second.
+/// Recordings and megabytes per second.
 pub(crate) fn rate(amount: Amount, seconds: f64) -> String {
     format!(
         "{} recordings/s, {} MB/s",
@@ -235,7 +235,7 @@ fn seconds_left(seconds: f64, share: f64) -> Option<f64> {
     (share > 0.0 && share < 1.0).then(|| seconds * (1.0 - share) / share)
 }
 
-/// A time to come, as coarse as it is known.
+/// Remaining time, rounded to what the estimate supports.
 fn duration(seconds: f64) -> String {
     let seconds = seconds.ceil() as u64;
     match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn the_time_left_of_many_recordings_follows_the_bytes() {
-        // Not by `new`, which is heard in the whole process.
+        // Not by `new`, which affects the whole process.
         let progress = Progress {
             task: Task::Recordings,
             begun: Instant::now(),

@@ -1,4 +1,4 @@
-//! Where a page comes from: date, command line, version, the files read with their SHA-256, and the stand file.
+//! Provenance of a page: date, command line, version, the files read with their SHA-256, and the stand file.
 
 use std::io;
 use std::path::PathBuf;
@@ -10,25 +10,25 @@ use crate::file_name::ShowPath;
 use crate::io::{Input, sum};
 use crate::recording::moment::utc;
 
-/// The last second of the year 9999.
+/// Last second of the year 9999.
 const LAST_SECOND: u64 = 253_402_300_799;
 
-/// What a page says of the run that made it.
+/// Provenance that a page gives.
 pub(crate) struct Provenance {
     /// Date and time in UTC.
     date: String,
     command: String,
-    /// Each input with its SHA-256, or why it has none.
+    /// Each input with its SHA-256, or the reason for not having one.
     inputs: Vec<[String; 2]>,
     /// Name, SHA-256 and text of the stand file.
     stand: Option<[String; 3]>,
 }
 
 impl Provenance {
-    /// That of this run, which reads these inputs and perhaps a stand file.
+    /// Provenance of this run, with its inputs and optional stand file.
     ///
     /// # Errors
-    /// If one of them cannot be read, or `SOURCE_DATE_EPOCH` is set and no time.
+    /// If one of them cannot be read, or `SOURCE_DATE_EPOCH` is set but not a time.
     pub(crate) fn of(inputs: &[PathBuf], stand: Option<(&str, &str)>) -> Result<Self, Failure> {
         let each = inputs.iter().map(|input| {
             let input = Input::of(input);
@@ -72,7 +72,7 @@ impl Provenance {
     }
 }
 
-/// Date and time in UTC (ISO 8601): now, or what `SOURCE_DATE_EPOCH` gives for reproducible files.
+/// Date and time in UTC (ISO 8601): now, or from `SOURCE_DATE_EPOCH` for reproducible files.
 fn date() -> Result<String, Failure> {
     let seconds = match std::env::var("SOURCE_DATE_EPOCH") {
         Ok(text) => text.trim().parse().ok().filter(|s| *s <= LAST_SECOND),
@@ -91,7 +91,7 @@ fn date() -> Result<String, Failure> {
     Ok(format!("{}Z", utc(seconds)))
 }
 
-/// The command line as a shell takes it, the program by its name alone.
+/// The command line quoted for a shell, with the program without its path.
 fn command(words: impl Iterator<Item = String>) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_./=:,+%@^".contains(c);
     let quoted = |word: String| match !word.is_empty() && word.chars().all(is_plain) {
@@ -102,7 +102,7 @@ fn command(words: impl Iterator<Item = String>) -> String {
     format!("torqcomp {}", rest.join(" "))
 }
 
-/// SHA-256 of an input; what can be read only once has none.
+/// SHA-256 of an input; none if it can be read only once.
 fn hash(input: &Input) -> Result<String, Failure> {
     let path = match input {
         Input::Stdin => return Ok(String::new()),

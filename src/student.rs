@@ -1,14 +1,14 @@
-//! Student's factor of a coverage interval.
+//! Student's factor for coverage intervals.
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// 97.5 % quantile of the normal distribution.
 const NORMAL: f64 = 1.959_963_984_540_054;
-/// Degrees of freedom from which on the expansion about the normal quantile is exact to rounding. The iteration of `statrs`
-/// does not end for some above 10⁷.
+/// Degrees of freedom from which the expansion about the normal quantile is exact to rounding. The iteration of
+/// `statrs` does not terminate for some values above 10⁷.
 const MANY: f64 = 1e4;
 
-/// Student's 97.5 % quantile over the normal one.
+/// Ratio of Student's 97.5 % quantile to the normal one.
 pub fn student(freedom: f64) -> f64 {
     if freedom.is_infinite() {
         return 1.0;
@@ -44,7 +44,7 @@ mod tests {
         assert!((student(1000.0) * NORMAL - 1.962_34).abs() < 1e-5);
     }
 
-    /// Each of these numbers of degrees of freedom kept the iteration of the quantile from ending.
+    /// Degrees of freedom for which the iteration of the quantile did not terminate.
     #[test]
     fn very_many_degrees_of_freedom_end() {
         for freedom in [1.45e7, 1.48e7, 1.62e7, 1e12, 1e34] {

@@ -4,20 +4,20 @@ use torqcomp_model::{Dimension, Unit};
 
 use crate::failure::{ErrorCode, Failure};
 
-/// A unit and how the file writes it.
+/// A unit and its spelling in the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedUnit {
     /// As written.
     pub text: String,
-    /// What it means.
+    /// Its meaning.
     pub unit: Unit,
 }
 
-/// Unit of samples whose full scale is not known.
+/// Unit of samples of unknown full scale.
 pub(crate) const OF_FULL_SCALE: &str = "of full scale";
 
 impl NamedUnit {
-    /// Reads a unit as recorders write it; words in brackets after it are left out
+    /// Reads a unit as recorders write it, without words in brackets after it
     /// (`Voltage (unscaled)` names no unit).
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
@@ -26,7 +26,7 @@ impl NamedUnit {
             Some(("", inside)) => inside,
             _ => text,
         };
-        // A bare number is no unit, although "1" stands for a ratio.
+        // A bare number is not a unit, although "1" denotes a ratio.
         if text.is_empty() || text.chars().all(|c| c.is_ascii_digit() || c == '.') {
             return None;
         }
@@ -36,7 +36,7 @@ impl NamedUnit {
         })
     }
 
-    /// Reads a unit that was given with a flag.
+    /// Reads a unit given with a flag.
     pub(crate) fn given(flag: &str, text: &str) -> Result<Self, Failure> {
         match Unit::parse(text) {
             Ok(unit) => Ok(Self {
@@ -62,19 +62,19 @@ impl NamedUnit {
 pub struct RecordedChannel<'a> {
     /// Name of the channel.
     pub name: &'a str,
-    /// Its unit, if it is known.
+    /// Its unit, if known.
     pub unit: Option<&'a NamedUnit>,
-    /// Its unit as the file writes it.
+    /// Its unit as spelled in the file.
     pub unit_text: Option<&'a str>,
 }
 
-/// Text before and inside a bracket at the end of a heading.
+/// Text before and inside brackets at the end of a heading.
 pub(crate) fn inside_brackets(heading: &str) -> Option<(&str, &str)> {
     [('(', ')'), ('[', ']'), ('{', '}'), ('<', '>')]
         .into_iter()
         .find_map(|(open, close)| {
             let body = heading.trim_end().strip_suffix(close)?;
-            // The matching bracket: units may hold brackets themselves.
+            // The matching bracket: units may contain brackets.
             let mut depth = 1;
             for (place, c) in body.char_indices().rev() {
                 depth += i32::from(c == close) - i32::from(c == open);

@@ -1,4 +1,4 @@
-//! What a user should know about a result.
+//! Warnings about a result.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -23,7 +23,7 @@ impl Warning {
     }
 }
 
-/// Every code, what it means, and what to do, by where it comes from. `docs/warnings.md` is written from this list.
+/// Every code with its meaning and remedy, grouped by origin. `docs/warnings.md` is generated from this list.
 #[rustfmt::skip]
 pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
     ("Compensate and harmonics", &[

@@ -117,7 +117,7 @@ fn units() {
         no_time_unit.as_bytes(),
         &["--time-unit", "V"],
         2,
-        &["no unit of time"],
+        &["not a unit of time"],
     );
     let no_headings: String = good().lines().skip(1).map(|l| format!("{l}\n")).collect();
     refused(no_headings.as_bytes(), &[], 1, &["no heading", "--rate"]);

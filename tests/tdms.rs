@@ -360,7 +360,7 @@ fn damage_behind_whole_segments_leaves_them() {
         folder.write("a.tdms", segment(14, 4713, &metadata, &[0; 24], true));
         folder
             .run(&["inspect", "a.tdms"])
-            .says(1, &["longer than it says"]);
+            .says(1, &["exceed their declared length"]);
     }
     let mut metadata = Out::new(false);
     metadata.u32(1).object("/'g'/'a'", Ok((0x0b, 3))).u32(0);
@@ -509,7 +509,11 @@ fn scales_that_are_not_known_or_whole_are_named() {
             &[count],
             "lacks Linear_Y_Intercept",
         ),
-        (&[], &[("NI_Number_Of_Scales", 4e9)], "announced"),
+        (
+            &[],
+            &[("NI_Number_Of_Scales", 4e9)],
+            "declared, but missing",
+        ),
         (&[], &[count], "scale 0 has no type"),
         (
             &[("NI_Scale[0]_Scale_Type", "AdvancedAPI")],

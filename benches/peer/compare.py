@@ -2,8 +2,8 @@
 
     python compare.py [--ends N] [--tolerance R] PEER TORQCOMP
 
-The two go on differently beyond the ends of the record, so that samples near them are left out.
-The difference is given as its rms over the rms of the peer's torque about its mean.
+The programs extrapolate the record differently, so samples near its ends are excluded.
+The difference is given as its rms relative to the rms of the peer's torque about its mean.
 """
 
 import argparse
@@ -43,7 +43,7 @@ def main():
         sys.exit(f"the time stamps differ by up to {apart:.3g} s")
     middle = slice(args.ends, len(time_a) - args.ends)
     if len(time_a[middle]) < 1000:
-        sys.exit(f"{len(time_a)} rows are too few to compare with {args.ends} left out at each end")
+        sys.exit(f"{len(time_a)} rows are too few to compare with {args.ends} excluded at each end")
     difference = torque_b[middle] - torque_a[middle]
     relative = np.sqrt(np.mean(difference**2)) / np.std(torque_a[middle])
     print(
@@ -52,7 +52,7 @@ def main():
         if relative <= args.tolerance
         else f"relative rms difference {relative:.3g}, at most {args.tolerance:g} expected"
     )
-    # A difference that is not a number fails as well.
+    # A NaN difference also fails.
     sys.exit(0 if relative <= args.tolerance else 1)
 
 

@@ -1,9 +1,9 @@
-"""One candidate of a diagnosis fitted the plain way: SciPy's least_squares over a stand with cubic stiffness.
+"""One candidate of a diagnosis fitted in plain Python: SciPy's least_squares for a stand with cubic stiffness.
 
 usage: diagnose.py TRAIN.csv HOLDOUT.csv
 
-The stand is x'' + 2 zeta w x' + w^2 (x + c x^3) = w^2 u with u linear between samples, integrated by a fourth-order
-Runge-Kutta method of fixed step as one would write it in NumPy's company, compiled by no one.
+The stand is x'' + 2 zeta w x' + w^2 (x + c x^3) = w^2 u with u linear between samples, integrated by a fixed-step
+fourth-order Runge-Kutta method in plain Python with NumPy, not compiled.
 """
 
 import json

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Time of a whole diagnosis of two records of 32,000 samples beside that of one candidate fitted with SciPy.
+# Time of a complete diagnosis of two records of 32,000 samples, compared with one candidate fitted with SciPy.
 #
 # usage: benches/peer/diagnose.sh [EFFECT]      (default cubic-stiffness)
 #
-# environment: PYTHON [python3], a Python that has numpy and scipy or can make an environment that has;
-# PEER_CACHE, the folder of that environment [peer, in cargo's target folder]; CARGO_TARGET_DIR as cargo takes it
+# environment: PYTHON [python3], a Python with numpy and scipy, or able to create an environment with them;
+# PEER_CACHE, the folder of that environment [peer, in cargo's target folder]; CARGO_TARGET_DIR as for cargo
 set -euo pipefail
 
 here=$(cd "$(dirname "$0")" && pwd)

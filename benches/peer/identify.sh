@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Compares `torqcomp identify` with the usual way in Python on records of a million samples. See README.md.
+# Compares `torqcomp identify` with typical Python scripts on records of a million samples. See README.md.
 set -euo pipefail
 
 rows=${1:-1000000}
@@ -42,7 +42,7 @@ if [[ ! -f $data/response.csv || $here/identify_make.py -nt $data/response.csv ]
     "$python" "$here/identify_make.py" "$rows" "$data" || fail "no records to measure with"
 fi
 
-# The command of torqcomp for a job: modal work finds the number of modes itself.
+# The torqcomp command for a job: the modal one finds the number of modes itself.
 ours() {
     local both=(response "$data/response.csv" --applied applied --measured measured
         --excitation random --segment 16384 --band 100..2300)

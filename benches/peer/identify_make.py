@@ -1,10 +1,10 @@
-"""Writes the records that identify.sh measures with: decay.csv and response.csv.
+"""Writes the records for identify.sh: decay.csv and response.csv.
 
     python identify_make.py ROWS FOLDER
 
 decay.csv: one mode at 590 Hz, decay rate 3 1/s, from 2 V, noise of 0.02 V, 200 kHz. response.csv: two
-modes at 590 Hz and 1480 Hz driven by noise up to 2400 Hz, noise of 1 % on the answer, 20 kHz. The answer
-is the response times the spectrum of the whole record, so it is exact (and periodic).
+modes at 590 Hz and 1480 Hz driven by noise up to 2400 Hz, noise of 1 % on the response, 20 kHz. The output
+is the frequency response times the spectrum of the whole record, so it is exact (and periodic).
 """
 
 import sys

@@ -1,10 +1,10 @@
-"""The usual way in Python: constants of a stand out of a record.
+"""Typical Python script: constants of a stand from a record.
 
     python identify_peer.py decay|response|modal RECORD [REPORT]
 
-decay: polars reads, an FFT gives the start, scipy.optimize.least_squares fits a decaying sine with an
+decay: polars reads, an FFT gives the initial guess, scipy.optimize.least_squares fits a decaying sine with an
 offset and a drift to every sample. response: scipy.signal.csd and welch give H1 (Hann, half overlapping
-segments of 16384), least_squares fits two modes to it from starts at its peaks. modal: the same H1 into
+segments of 16384), least_squares fits two modes to it, starting at its peaks. modal: the same H1 into
 sdypy-EMA, poles by LSCF up to order 30, those nearest to the peaks. Writes frequencies (Hz), damping
 ratios and the seconds after reading as JSON.
 """
@@ -36,7 +36,7 @@ def decay(table):
 
 
 def h1(table):
-    """Frequencies of the band and H1 there."""
+    """Frequencies in the band, and H1 at them."""
     t, x, y = (table[:, i].to_numpy() for i in (0, 1, 2))
     rate = (len(t) - 1) / (t[-1] - t[0])
     frequency, cross = signal.csd(x, y, rate, nperseg=SEGMENT)

@@ -1,8 +1,8 @@
-"""Writes the test record: `time_s,bridge_V` at 20 kHz, about 25 bytes a row.
+"""Writes the test record: `time_s,bridge_V` at 20 kHz, about 25 bytes per row.
 
     python make_record.py [--rows N] [--seed N] OUTPUT
 
-A mean torque and harmonics of 60 Hz, as the stand in stand.toml answers them, with white noise.
+The response of the stand in stand.toml to a mean torque and harmonics of 60 Hz, with white noise.
 The same rows and seed give the same file.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 
 RATE_HZ = 20_000
 FUNDAMENTAL_HZ = 60
-# 60 Hz at 20 kHz repeats itself after this many samples (three turns).
+# Period of 60 Hz at 20 kHz in samples (three turns).
 PERIOD_SAMPLES = 1000
 CHUNK_ROWS = 250 * PERIOD_SAMPLES
 
@@ -71,7 +71,7 @@ def main():
     if args.rows < 2:
         sys.exit("--rows: expected at least 2")
 
-    # The record appears whole or not at all.
+    # The record is created complete or not at all.
     part = f"{args.output}.part"
     try:
         with open(part, "wb") as file:

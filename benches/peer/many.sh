@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Many short logs: one run of torqcomp over their folder, a shell loop over one-file runs of a Python reader, and one run of
-# torqcomp over one record of the same rows, both without waiting for the disk and with it. See README.md.
+# Many short logs: one run of torqcomp over their folder, a shell loop over single-file runs of a Python script, and one
+# run of torqcomp over one record of the same rows, the torqcomp runs with and without sync to the disk. See README.md.
 set -euo pipefail
 
 usage() {
@@ -68,7 +68,7 @@ tail -n +2 "$record" | heading=$heading split -l "$rows" -d -a 5 --additional-su
 
 # --- measure --------------------------------------------------------------------------------------
 
-# Runs a command and prints the seconds that it took, by the clock and of the processors.
+# Runs a command and prints its wall time and CPU time in seconds.
 seconds() {
     sync -f "$data"
     local TIMEFORMAT='%R %U %S'
@@ -99,7 +99,7 @@ for ((pair = 1; pair <= pairs; pair++)); do
 done
 read -r looped _ < <(seconds loop)
 
-# The results of both ways agree, but for the ends of each log.
+# Both results agree, except at the ends of each log.
 first=$(find "$data/logs" -name '*.csv' | sort | head -n 1)
 name=$(basename "$first" .csv)
 "$python" "$here/compare.py" --ends $((rows / 4)) "$data/loop/$name.csv" "$data/out/$name.torque.csv" ||

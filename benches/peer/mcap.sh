@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Compares torqcomp with the Python reader of MCAP files on messages of ROS 2. See README.md.
+# Compares torqcomp with the Python MCAP reader on ROS 2 messages. See README.md.
 # usage: benches/peer/mcap.sh [MESSAGES]
 set -euo pipefail
 
@@ -15,6 +15,6 @@ fi
 if [[ ! -x $cache/bin/python ]]; then
     "${PYTHON:-python3}" -m venv "$cache"
 fi
-# The versions that the other comparisons are pinned to.
+# The pinned versions of the other comparisons.
 grep '^mcap' "$here/requirements.txt" | "$cache/bin/pip" install --quiet --requirement /dev/stdin
 exec "$cache/bin/python" "$here/mcap_reader.py" "$torqcomp" "${1:-200000}"

@@ -1,6 +1,7 @@
-"""One number of a ROS 2 JointState recording: torqcomp beside the Python `mcap` reader with ROS 2
-decoding, on the same file, one after the other, as user plus system time on one core. Each compression has several
-rounds, the reader once and then torqcomp several times; printed are medians, and the smallest and largest ratio.
+"""One number of a ROS 2 JointState recording: torqcomp compared with the Python `mcap` reader with ROS 2
+decoding, on the same file, one after the other, in user plus system time on one core. Each compression is run in
+several rounds, each with the reader once and then torqcomp several times; prints medians, and the smallest and largest
+ratio.
 
 Usage: python mcap_reader.py path/to/torqcomp [messages]
 Needs the packages mcap and mcap-ros2-support.

@@ -1,8 +1,8 @@
-"""Runs one command and appends what it took to a table: name, wall s, CPU s, peak memory in KiB.
+"""Runs one command and appends its resource use to a table: name, wall s, CPU s, peak memory in KiB.
 
     python measure.py TABLE NAME COMMAND [ARGUMENT ...]
 
-CPU seconds are user and system time of all threads. What the command prints is shown only if it
+CPU seconds are user and system time of all threads. The output of the command is shown only if it
 fails. Linux; standard library only.
 """
 

@@ -1,10 +1,10 @@
-"""The usual way in Python: read a record, divide the stand's response out, write the torque.
+"""Typical Python script: read a record, divide out the stand's response, write the torque.
 
     python peer.py [--tuned] RECORD OUTPUT
 
 The whole record is read by polars, transformed by SciPy, multiplied by the inverse response of the
 stand in stand.toml up to 2400 Hz (with an edge that ends at 2880 Hz), transformed back and written
-by polars. --tuned spares the work on the frequencies above the edge, and the copies.
+by polars. --tuned skips the frequencies above the edge, and avoids copies.
 """
 
 import argparse
@@ -18,9 +18,9 @@ from scipy import fft
 INERTIA = 5.85e-3
 DAMPING = 3.07
 STIFFNESS = 8.1e4
-# Newton metres of the recorded torque per volt.
+# Recorded torque per volt, in N m.
 TORQUE_PER_VOLT = 1.23e3 * 1.3558179483314004
-# The band: passed in full up to BAND_HZ, nothing from BAND_END_HZ on.
+# The band: passed in full up to BAND_HZ, rejected from BAND_END_HZ.
 BAND_HZ = 2400.0
 BAND_END_HZ = 2880.0
 # The edge is the running integral of a Kaiser window of this shape.
@@ -29,7 +29,7 @@ EDGE_NODES = 20_001
 
 
 def band_gain(frequency_hz):
-    """1 up to BAND_HZ, 0 from BAND_END_HZ, a smooth fall between; rising frequencies."""
+    """1 up to BAND_HZ, 0 from BAND_END_HZ, smooth in between; for ascending frequencies."""
     gain = np.zeros_like(frequency_hz)
     start, end = np.searchsorted(frequency_hz, (BAND_HZ, BAND_END_HZ))
     gain[:start] = 1.0
@@ -55,7 +55,7 @@ def compensate(volts, rate_hz):
 
 
 def compensate_tuned(volts, rate_hz):
-    """The same, with no work on frequencies that the band does not pass."""
+    """The same, without computing frequencies outside the band."""
     length = len(volts)
     spectrum = fft.rfft(volts)
     passed = min(len(spectrum), int(np.ceil(BAND_END_HZ * length / rate_hz)))

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Compares torqcomp with the usual way in Python on one record. See README.md.
+# Compares torqcomp with a typical Python script on one record. See README.md.
 set -euo pipefail
 
 usage() {
@@ -73,7 +73,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 here=benches/peer
 python=${PYTHON:-python3}
 
-# --- what is needed -------------------------------------------------------------------------------
+# --- requirements ---------------------------------------------------------------------------------
 
 [[ -r /proc/self/status ]] || fail "needs Linux: peak memory is read from /proc"
 command -v cargo >/dev/null || fail "cargo not found; install Rust"
@@ -128,7 +128,7 @@ measure() {
     local name=$1
     local -n command=${name}_command
     rm -f "${output[$name]}"
-    # What the run before left to be written must not burden this one.
+    # Pending writes of the previous run must not slow down this one.
     sync -f "$data"
     "$python" "$here/measure.py" "$table" "$name" "${command[@]}" || fail "$name failed"
 }
@@ -147,7 +147,7 @@ torqcomp_bytes=$(stat -c %s "${output[torqcomp]}")
 # --- measure --------------------------------------------------------------------------------------
 
 for ((pair = 1; pair <= pairs; pair++)); do
-    # Each goes first in every other pair.
+    # The programs alternate in going first.
     if ((pair % 2)); then
         measure peer
         measure torqcomp

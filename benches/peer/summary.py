@@ -1,4 +1,4 @@
-"""Prints the table of runs that measure.py made, pair by pair, and the medians of the ratios.
+"""Prints the table of runs written by measure.py, pair by pair, and the medians of the ratios.
 
     python summary.py TABLE
 """

@@ -1,4 +1,4 @@
-//! A case on disk, and what `torqcomp diagnose` answered.
+//! A case on disk, and the answer of `torqcomp diagnose`.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -7,31 +7,31 @@ use std::time::Instant;
 
 use serde_json::Value;
 
-/// One N m per recorded volt of the declared stand: 1.23e3 ft lbf.
+/// Torque per recorded volt of the declared stand in N m: 1.23e3 ft lbf.
 const N_M_PER_VOLT: f64 = 1.23e3 * 1.355_817_948_331_400_4;
 
-/// A folder with a case in it.
+/// A folder containing a case.
 pub struct Case {
     pub folder: PathBuf,
     pub truth: Value,
 }
 
-/// What came back.
+/// The answer.
 pub struct Answer {
     pub case: Case,
-    /// Exit code, `None` if it was ended from outside.
+    /// Exit code; `None` if killed.
     pub code: Option<i32>,
     /// The JSON, or null.
     pub json: Value,
     pub stderr: String,
-    /// Time on the clock, and of the processors where the system tells and nothing else runs.
+    /// Wall time, and CPU time if available and nothing else runs.
     pub seconds: f64,
     pub processor_seconds: Option<f64>,
     pub refined: PathBuf,
 }
 
 impl Case {
-    /// Reads every case below a folder, in the order of their paths.
+    /// Reads every case below a folder, sorted by path.
     pub fn read_all(folder: &Path) -> io::Result<Vec<Self>> {
         let mut cases = Vec::new();
         for effect in sorted(folder)? {
@@ -53,7 +53,7 @@ impl Case {
         self.truth["effect"].as_str().unwrap_or_default()
     }
 
-    /// The effects that are in the record, in alphabetical order.
+    /// The effects in the record, in alphabetical order.
     pub fn effects(&self) -> Vec<&str> {
         let list = self.truth["effects"].as_array();
         let names = list.into_iter().flatten().filter_map(Value::as_str);
@@ -74,26 +74,26 @@ impl Case {
         self.truth["measured_column"].as_str().unwrap_or_default()
     }
 
-    /// Strength in training and held-out data.
+    /// Strength in training and hold-out data.
     pub fn strength(&self) -> [f64; 2] {
         ["train", "holdout"].map(|key| self.truth["strength"][key].as_f64().unwrap_or(f64::NAN))
     }
 
-    /// The noise in the held-out record, rms.
+    /// Noise in the hold-out record, rms.
     pub fn floor(&self) -> f64 {
         self.truth["noise"]["holdout_rms_n_m"]
             .as_f64()
             .unwrap_or(f64::NAN)
     }
 
-    /// Held-out error of the best plain fit.
+    /// Hold-out error of the best plain fit.
     pub fn plain_error(&self) -> f64 {
         self.truth["plain_fit"]["holdout_rms_with_noise_n_m"]
             .as_f64()
             .unwrap_or(f64::NAN)
     }
 
-    /// Runs the binary, or takes what an earlier run left.
+    /// Runs the binary, or uses the result of an earlier run.
     pub fn diagnose(self, binary: &Path, answers: &Path, reuse: bool) -> io::Result<Answer> {
         let folder = answers
             .join(self.effect())
@@ -145,10 +145,10 @@ impl Case {
     }
 }
 
-/// Processor time of the children that have ended, from `/proc` (Linux, 100 ticks a second).
+/// CPU time of finished child processes, from `/proc` (Linux, 100 ticks per second).
 fn children_seconds() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // After the name in brackets the third field of the line comes first; 16 and 17 are the children's.
+    // The first field after the name in brackets is field 3 of the line; 16 and 17 are those of the children.
     let fields: Vec<&str> = text.rsplit_once(')')?.1.split_whitespace().collect();
     let ticks = |field: usize| fields.get(field - 3)?.parse::<f64>().ok();
     Some((ticks(16)? + ticks(17)?) / 100.0)
@@ -175,7 +175,7 @@ impl Answer {
         list.iter().filter_map(Value::as_str).collect()
     }
 
-    /// Held-out error in N m of `declared`, `before` or `after`.
+    /// Hold-out error in N m of `declared`, `before` or `after`.
     pub fn error(&self, which: &str) -> f64 {
         let error = &self.json["error"];
         let scale = match error["unit"].as_str() {
@@ -197,7 +197,7 @@ impl Answer {
     pub fn is_right(&self) -> bool {
         match self.case.effect() {
             "none" => self.verdict() == "nothing-missing",
-            // What is listed may be named, but must not pass for all of it.
+            // Listed effects may be named, but must not explain everything.
             "mixed" => !["explained", "failed"].contains(&self.verdict()),
             "unlisted" => ["unexplained", "partly-explained"].contains(&self.verdict()),
             _ => {
@@ -223,7 +223,7 @@ impl Answer {
         }
     }
 
-    /// What was said about a candidate: status, error over the noise, reason.
+    /// Result for a candidate: status, error over the noise, reason.
     pub fn candidate(&self, name: &str) -> String {
         let list = self.json["candidates"]
             .as_array()

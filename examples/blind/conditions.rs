@@ -1,4 +1,4 @@
-//! Right answers by the conditions of a record, the wrong ones, and times.
+//! Right answers by the conditions of a record, wrong answers, and times.
 
 use std::fmt::Write as _;
 
@@ -6,13 +6,13 @@ use crate::blind::wide::NATURAL_HZ;
 use crate::case::{Answer, Case};
 use crate::report::count;
 
-/// Samples of a record that does not say how many.
+/// Default number of samples of a record.
 const SAMPLES: f64 = 32_000.0;
 
-/// The row that a case belongs to.
+/// The row of a case.
 type Row = fn(&Case) -> String;
 
-/// What the table has a row for each of.
+/// Condition with a table row for each value.
 const CONDITIONS: [(&str, Row); 6] = [
     ("natural frequency", natural),
     ("damping ratio", damping),
@@ -43,7 +43,7 @@ fn damping(case: &Case) -> String {
     within(ratio, 0.01, 0.05)
 }
 
-/// Which of three ranges a number is in; the text sorts in their order.
+/// Range of a number, out of three; the texts sort in the order of the ranges.
 fn within(value: f64, low: f64, high: f64) -> String {
     match value {
         _ if value < low => format!("1: below {low}"),
@@ -52,7 +52,7 @@ fn within(value: f64, low: f64, high: f64) -> String {
     }
 }
 
-/// The input of training; where the held-out one is another, both.
+/// The training input, or both inputs if that of the hold-out record differs.
 fn input(case: &Case) -> String {
     let kind = |record: &str| {
         let described = case.truth["records"][record].as_str().unwrap_or_default();

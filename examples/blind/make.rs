@@ -1,4 +1,4 @@
-//! Writing blind records, several at a time.
+//! Writing blind records in parallel.
 
 use std::io;
 use std::path::PathBuf;
@@ -37,7 +37,7 @@ pub struct Make {
     threads: usize,
 }
 
-/// Two positive numbers, the second no smaller.
+/// Two positive numbers in ascending order.
 fn range(text: &str) -> Result<(f64, f64), String> {
     let wrong = || format!("`{text}` is not a range of two positive numbers such as 0.3..25");
     let (least, most) = text.split_once("..").ok_or_else(wrong)?;
@@ -49,13 +49,13 @@ fn range(text: &str) -> Result<(f64, f64), String> {
     }
 }
 
-/// Makes the records, number by number, so that a set that is cut short still has every effect in it.
+/// Makes the records by number, so that an interrupted set still contains every effect.
 pub fn make(arguments: &Make) -> io::Result<()> {
     let asked = (arguments.wide || arguments.strength.is_some()).then_some(Asked {
         wide: arguments.wide,
         strength: arguments.strength,
     });
-    // Only where asked for with the stand of the thesis.
+    // Only on request with the stand of the thesis.
     let with_mixed = arguments.wide || arguments.only.iter().any(|only| only == several::MIXED);
     let several = several::SEVERAL.iter().map(|(name, _)| *name);
     let wanted: Vec<&str> = catalogue::effects()

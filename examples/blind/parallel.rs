@@ -1,4 +1,4 @@
-//! A list worked off by a few threads, answers in the order of the list.
+//! Processing of a list by several threads, with results in list order.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -1,4 +1,4 @@
-//! The torque that `torqcomp compensate` recovers with the truth in the stand file, against the plain stand.
+//! The torque recovered by `torqcomp compensate` with the true stand file, compared with the plain stand.
 
 use std::fmt::Write as _;
 use std::io;
@@ -99,7 +99,7 @@ fn table(cases: &[Case], torques: &[Torque], each: bool) -> String {
     text
 }
 
-/// Before over after, of the signal and of the torque; torque error over what noise makes of it.
+/// Before over after, for signal and torque; torque error over that due to noise.
 fn figures(case: &Case, torque: &Torque) -> [f64; 3] {
     let number = |r: &Result<f64, String>| r.as_ref().copied().unwrap_or(f64::NAN);
     let refined = number(&torque.refined);
@@ -110,7 +110,7 @@ fn figures(case: &Case, torque: &Torque) -> [f64; 3] {
     ]
 }
 
-/// Median, least and largest.
+/// Median, minimum and maximum.
 fn middle(values: &mut [f64]) -> String {
     values.sort_by(f64::total_cmp);
     let values = &*values;

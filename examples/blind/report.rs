@@ -6,7 +6,7 @@ use crate::case::Answer;
 use crate::conditions;
 use crate::torque::Torque;
 
-/// One case on one line.
+/// One case in one line.
 pub fn line(answer: &Answer) -> String {
     let [train, holdout] = answer.case.strength();
     format!(
@@ -33,7 +33,7 @@ pub fn line(answer: &Answer) -> String {
     )
 }
 
-/// What the records are and how to make them again.
+/// Description of the records and how to reproduce them.
 const PREFACE: &str = "\
 # Blind records
 
@@ -58,7 +58,7 @@ cargo run --release --example blind -- score records --binary target/release/tor
 
 ";
 
-/// The same of records of many stands.
+/// The same for records of many stands.
 const WIDE: &str = "\
 # Blind records of many stands
 
@@ -75,9 +75,9 @@ cargo run --release --example blind -- score records --binary target/release/tor
 
 ";
 
-/// Marks, table by effect, confusion matrix and, if wanted, what went wrong.
+/// Marks, table by effect, confusion matrix and, if requested, the failures.
 pub fn markdown(answers: &[Answer], failures: bool) -> String {
-    // Only wide records say how many samples they have.
+    // Only wide records give their number of samples.
     let wide = answers.iter().all(|a| !a.case.truth["wide"].is_null());
     let mut text = String::from(if wide { WIDE } else { PREFACE });
     marks(&mut text, answers);
@@ -108,7 +108,7 @@ fn listed(answers: &[Answer]) -> impl Iterator<Item = &Answer> {
         .filter(|answer| answer.case.effects() == [answer.case.effect()])
 }
 
-/// How many are hit, of how many.
+/// Number of hits and total.
 pub fn count<'a>(
     answers: impl Iterator<Item = &'a Answer>,
     hit: impl Fn(&Answer) -> bool,

@@ -58,7 +58,7 @@ pub fn score(arguments: &Score) -> io::Result<()> {
         let wanted = arguments.only.is_empty() || arguments.only.iter().any(|n| n == case.effect());
         wanted && (arguments.from_number..=arguments.max_number).contains(&case.number())
     });
-    // Number by number: a run that is cut short has seen every effect.
+    // By number: an interrupted run has covered every effect.
     cases.sort_by_key(Case::number);
     let cells: Vec<_> = cases
         .into_iter()

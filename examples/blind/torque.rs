@@ -1,5 +1,5 @@
-//! The inverse check: the torque that `compensate` recovers with the plain stand and with the refined
-//! one, against the torque that was applied.
+//! Inverse check: the torque recovered by `compensate` with the plain stand and with the refined
+//! one, compared with the applied torque.
 
 use std::f64::consts::PI;
 use std::path::Path;
@@ -11,9 +11,9 @@ use crate::case::{Answer, Case};
 pub struct Torque {
     /// With the stand of the best plain fit.
     pub plain: Result<f64, String>,
-    /// With the stand that `diagnose` wrote.
+    /// With the stand written by `diagnose`.
     pub refined: Result<f64, String>,
-    /// What the noise alone makes of it through the true plain stand.
+    /// From the noise alone through the true plain stand.
     pub floor: f64,
 }
 
@@ -85,7 +85,7 @@ fn recovered(case: &Case, binary: &Path, stand: &Path) -> Result<f64, String> {
             applied.len()
         ));
     }
-    // A twentieth at both ends is left out: there the record begins and ends within the filter.
+    // Excludes a twentieth at both ends, where the record begins and ends within the filter.
     let edge = applied.len() / 20;
     let inner = edge..applied.len() - edge;
     let errors: Vec<f64> = inner.map(|i| torque[i] - applied[i]).collect();

@@ -1,10 +1,10 @@
-//! Makes the example record: what Hertel's recorder would have shown, and the torque behind it.
+//! Makes the example record: the signal that Hertel's recorder would have shown, and the torque that causes it.
 //!
 //! `cargo run --example hertel` writes `record.csv` and `torque_applied.csv` beside this file.
 //!
 //! The record is simulated, not measured. Constants: thesis, eq. (31) and (C25). The torque is a sum
 //! of exponentials `Σ c e^{pτ}`, so the answer of `J θ'' + f θ' + K θ = T` from rest is known in
-//! closed form and nothing of torqcomp is used to make it:
+//! closed form, computed without any part of torqcomp:
 //!
 //! ```text
 //! y(τ) = H(p) [ e^{pτ} − (p − s₂)/(s₁ − s₂) e^{s₁τ} + (p − s₁)/(s₁ − s₂) e^{s₂τ} ],
@@ -23,16 +23,16 @@ const STIFFNESS_FT_LBF: f64 = 8.1e4;
 const TORQUE_PER_VOLT_FT_LBF: f64 = 1.23e3;
 const RATE_HZ: f64 = 20_000.0;
 const SAMPLES: usize = 6000;
-/// The load is taken off at this time.
+/// Time at which the load is removed.
 const LOAD_OFF_S: f64 = 0.15;
-/// Time constant of the change that follows.
+/// Time constant of the resulting change.
 const CHANGE_S: f64 = 0.004;
-/// Noise of the recorder, rms, and its smallest step.
+/// Noise of the recorder, rms, and its quantisation step.
 const NOISE_V: f64 = 1e-6;
 const STEP_V: f64 = 1e-7;
 
 /// Component torques under load: amplitude in ft lbf, frequency in Hz, phase in rad. The double
-/// line frequency leads, as in any single-phase motor; 18.3 Hz is the imbalance of the rotor.
+/// line frequency dominates, as in any single-phase motor; 18.3 Hz is the rotor imbalance.
 const LOADED: [(f64, f64, f64); 8] = [
     (0.80, 0.0, 0.0),
     (0.06, 18.3, 1.0),
@@ -44,10 +44,10 @@ const LOADED: [(f64, f64, f64); 8] = [
     (0.02, 1920.0, 1.3),
 ];
 
-/// What taking off the load adds, coming in as `1 − e^{−τ/CHANGE_S}`.
+/// Components added by removing the load, rising as `1 − e^{−τ/CHANGE_S}`.
 const CHANGE: [(f64, f64, f64); 2] = [(-0.70, 0.0, 0.0), (0.35, 120.0, 1.9)];
 
-/// A term `Re(c e^{p (t − start)})` of the torque, from `start` on (or always).
+/// A term `Re(c e^{p (t − start)})` of the torque, from `start` (or always).
 struct Term {
     amplitude: Complex64,
     rate: Complex64,
@@ -76,7 +76,7 @@ fn terms() -> Vec<Term> {
     terms
 }
 
-/// The torque that acts at a time, in ft lbf.
+/// Applied torque at a time, in ft lbf.
 fn torque(terms: &[Term], time_s: f64) -> f64 {
     terms
         .iter()
@@ -88,7 +88,7 @@ fn torque(terms: &[Term], time_s: f64) -> f64 {
         .sum()
 }
 
-/// The torque that the beam shows at a time, in ft lbf.
+/// Torque in the beam at a time, in ft lbf.
 fn shown(terms: &[Term], time_s: f64) -> f64 {
     let (j, f, k) = (INERTIA_SLUG_FT2, DAMPING_FT_LBF_S, STIFFNESS_FT_LBF);
     let root = Complex64::new(f * f - 4.0 * j * k, 0.0).sqrt();
@@ -114,7 +114,7 @@ fn shown(terms: &[Term], time_s: f64) -> f64 {
         .sum()
 }
 
-/// Normally distributed numbers, the same on every run (Box and Muller, 1958).
+/// Reproducible normally distributed numbers (Box and Muller, 1958).
 struct Noise(u64);
 
 impl Noise {

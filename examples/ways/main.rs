@@ -1,5 +1,5 @@
-//! Writes the recordings of the worked ways in `docs/ways`, each into a folder of its own, and beside them the torque that
-//! they were made from.
+//! Writes the recordings of the worked examples in `docs/ways`, each into its own folder, together with the torque
+//! from which they were made.
 //!
 //! ```text
 //! cargo run --example ways -- FOLDER

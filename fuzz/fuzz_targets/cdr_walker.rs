@@ -1,4 +1,4 @@
-//! Any definition and any message: `definition 0xff message`. A number is found or refused.
+//! Arbitrary definition and message: `definition 0xff message`. A number is found or rejected.
 #![no_main]
 
 use std::sync::Arc;

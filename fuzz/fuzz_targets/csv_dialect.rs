@@ -1,4 +1,4 @@
-//! Any bytes as a recorder's text file: its dialect is told or refused, nothing else happens.
+//! Arbitrary bytes as a recorder's text file: its dialect is detected or rejected, nothing else happens.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

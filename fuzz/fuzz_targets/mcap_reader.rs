@@ -1,4 +1,4 @@
-//! Any bytes as an MCAP file: listed, read as a signal and copied without harm.
+//! Arbitrary bytes as an MCAP file: listing, reading as a signal and copying must be safe.
 #![no_main]
 
 use std::io::Cursor;

@@ -4,7 +4,7 @@ use libfuzzer_sys::fuzz_target;
 use torqcomp::io::Reading;
 use torqcomp::recording::read_other_format;
 
-// Any bytes as a WAV, universal, MATLAB or TDMS file: an answer or an error, no panic, and no memory beyond what is there.
+// Arbitrary bytes as a WAV, universal, MATLAB or TDMS file: a result or an error, no panic, memory bounded by input.
 fuzz_target!(|bytes: &[u8]| {
     if let Some(Ok(recording)) = read_other_format("fuzz", bytes, &Reading::default()) {
         assert!(!recording.channels.is_empty());

@@ -1,4 +1,4 @@
-//! Any text as a definition of messages, in every language: what is told from it can be chosen.
+//! Arbitrary text as a message definition, in every language: every listed field can be selected.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -68,12 +68,12 @@ pub struct Diagnose {
 }
 
 impl Diagnose {
-    /// The files that are fitted.
+    /// The training files.
     pub fn training_files(&self) -> Vec<PathBuf> {
         [self.train.as_slice(), &self.decay].concat()
     }
 
-    /// The files that are held out.
+    /// The hold-out files.
     pub fn held_out_files(&self) -> Vec<PathBuf> {
         [self.holdout.as_slice(), &self.holdout_decay].concat()
     }

@@ -1,4 +1,4 @@
-//! Help pages: options by groups, the rare ones in the long help only, and two examples at the end.
+//! Help pages: options in groups, rare ones in the long help only, and two examples at the end.
 
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches};
@@ -150,7 +150,7 @@ const GROUPS: [(&str, &[&str]); 7] = [
     ),
 ];
 
-/// Options that no result depends on, or whose files the manifest names by their content.
+/// Options that affect no result, or whose files the manifest identifies by content.
 const NOT_IN_RESULTS: &[&str] = &[
     "dry-run",
     "fail-fast",
@@ -172,7 +172,7 @@ const NOT_IN_RESULTS: &[&str] = &[
     "threads",
 ];
 
-/// Options that the short help leaves out.
+/// Options omitted from the short help.
 const RARE: &[&str] = &[
     "allow",
     "applied-unit",
@@ -211,10 +211,10 @@ const RARE: &[&str] = &[
     "with-recorded",
 ];
 
-/// Longest line of an example, without what marks that it goes on.
+/// Maximum length of an example line, without its continuation mark.
 const EXAMPLE_WIDTH: usize = 74;
 
-/// Two examples for each verb, the words of a verb and its test joined by a space.
+/// Two examples for each verb; a verb and its test are joined by a space.
 const EXAMPLES: &[(&str, [&str; 2])] = &[
     (
         "init",
@@ -337,7 +337,7 @@ const EXAMPLES: &[(&str, [&str; 2])] = &[
     ),
 ];
 
-/// The command line with its help as people read it.
+/// The command line with its help for people.
 #[must_use]
 pub fn command() -> Command {
     grouped("", Cli::command())
@@ -355,7 +355,7 @@ pub(crate) fn parse() -> Result<Cli, clap::Error> {
     Ok(cli)
 }
 
-/// The options given that a result may depend on, in the order of their names.
+/// The given options that may affect a result, sorted by name.
 fn options(command: &Command, matches: &ArgMatches) -> Vec<String> {
     let Some((name, given)) = matches.subcommand() else {
         return Vec::new();
@@ -391,7 +391,7 @@ fn grouped(path: &str, command: Command) -> Command {
     })
 }
 
-/// An example on lines of at most 78 letters, cut before options as a shell reads it.
+/// An example on lines of at most 78 characters, broken before options with shell continuations.
 fn folded(example: &str) -> String {
     let mut lines = vec![String::new()];
     for piece in example.split(" -") {
@@ -414,7 +414,7 @@ fn in_group(arg: Arg) -> Arg {
     };
     let has_it = |names: &[&str]| names.contains(&long.as_str());
     let arg = arg.hide_short_help(has_it(RARE));
-    // --name of a result is another one than that of a stand.
+    // --name of a result differs from --name of a stand.
     if arg.get_help_heading().is_some() {
         return arg.hide_short_help(true);
     }
@@ -478,7 +478,7 @@ mod tests {
             assert!(verbs.iter().any(|verb| verb == path), "{path}");
             for line in lines {
                 let words = line.replace('\'', "").replace("\"", "");
-                // Quantities in quotes hold spaces.
+                // Quoted quantities contain spaces.
                 let words: Vec<String> = match line.split('"').collect::<Vec<_>>()[..] {
                     [before, inside, after] => before
                         .split_whitespace()

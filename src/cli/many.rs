@@ -66,7 +66,7 @@ impl BatchOptions {
             || self.dry_run
     }
 
-    /// Failures after which no other recording is begun.
+    /// Number of failures after which no further recording is started.
     #[must_use]
     pub fn most_failures(&self) -> Option<u32> {
         match self.fail_fast {
@@ -103,7 +103,7 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// Whether a recording with that path below its root is in the part: the first eight bytes of the SHA-256 of the path,
+    /// Whether a recording with this path below its root is in the part: the first eight bytes of the path's SHA-256,
     /// as a number, modulo N is I − 1.
     pub(crate) fn takes(self, relative: &str) -> bool {
         sum::number_of(relative) % u64::from(self.of) == u64::from(self.index - 1)
@@ -126,10 +126,10 @@ pub(crate) fn shard(text: &str) -> Result<Shard, String> {
     }
 }
 
-/// What stands for a part of the recording's name in that of a result.
+/// Placeholders for parts of the recording's name in the name of a result.
 const PLACEHOLDERS: [&str; 3] = ["{stem}", "{ext}", "{name}"];
 
-/// The template of a file's name.
+/// A file-name template.
 pub(crate) fn template(text: &str) -> Result<String, String> {
     let mut rest = text.to_owned();
     for placeholder in PLACEHOLDERS {

@@ -1,4 +1,4 @@
-//! Values as people write them on the command line.
+//! Values on the command line.
 
 use std::path::PathBuf;
 
@@ -8,11 +8,11 @@ use crate::io::digits::Digits;
 use crate::io::positive_frequency;
 use crate::warning::CODES;
 
-/// Orders of a fundamental, rising.
+/// Orders of a fundamental, ascending.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Orders(pub Vec<f64>);
 
-/// Most orders that are fitted at once.
+/// Maximum number of orders fitted at once.
 const MOST_ORDERS: usize = 500;
 
 /// The band of a compensation.
@@ -20,7 +20,7 @@ const MOST_ORDERS: usize = 500;
 pub enum BandOption {
     /// Up to this frequency.
     Hz(f64),
-    /// That of the thesis.
+    /// The band of the thesis.
     Rated,
 }
 
@@ -59,7 +59,7 @@ pub fn range(text: &str) -> Result<(f64, f64), String> {
     }
 }
 
-/// A file for charts, which are written as SVG.
+/// A file for charts, written as SVG.
 pub fn svg_file(path: PathBuf) -> Result<PathBuf, String> {
     if is_dash(&path) {
         return Err("charts need the name of a file, such as chart.svg".to_owned());
@@ -73,12 +73,12 @@ pub fn svg_file(path: PathBuf) -> Result<PathBuf, String> {
     }
 }
 
-/// Endings of files of columns that polars, DuckDB and pandas read.
+/// Extensions of columnar files that polars, DuckDB and pandas read.
 const COLUMNS: [&str; 3] = ["parquet", "arrow", "feather"];
-/// Endings of other formats that no verb writes.
+/// Extensions of other formats that no verb writes.
 const FOREIGN: [&str; 8] = ["xlsx", "mat", "h5", "hdf5", "npy", "tdms", "wav", "uff"];
 
-/// A file for a result: text must not stand under a name that says otherwise.
+/// A file for a result: text must not get the name of another format.
 pub fn result_file(path: PathBuf) -> Result<PathBuf, String> {
     let end = path.extension().unwrap_or_default();
     let is = |other: &&&str| end.eq_ignore_ascii_case(other);
@@ -101,7 +101,7 @@ pub fn result_file(path: PathBuf) -> Result<PathBuf, String> {
     ))
 }
 
-/// A code that some warning has.
+/// A valid warning code.
 pub fn warning_code(text: &str) -> Result<String, String> {
     let mut codes = CODES
         .iter()

@@ -1,4 +1,4 @@
-//! Wrong command lines.
+//! Invalid command lines.
 
 use std::path::PathBuf;
 
@@ -8,13 +8,13 @@ use clap::error::ErrorKind;
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::path_of_bytes;
 
-/// Whether `--json` is among the arguments of the process, whatever else is wrong with them.
+/// Whether `--json` is among the arguments of the process, even if others are wrong.
 pub(crate) fn is_json_asked() -> bool {
     let mut options = std::env::args_os().skip(1).take_while(|arg| arg != "--");
     options.any(|arg| arg == "--json")
 }
 
-/// The file of `--log` among the arguments of the process, whatever else is wrong with them.
+/// The file of `--log` among the arguments of the process, even if others are wrong.
 pub(crate) fn log_asked() -> Option<PathBuf> {
     let mut words = std::env::args_os().skip(1).take_while(|arg| arg != "--");
     while let Some(word) = words.next() {
@@ -29,7 +29,7 @@ pub(crate) fn log_asked() -> Option<PathBuf> {
     None
 }
 
-/// What clap refuses, as a failure; `None` if it has only been asked for help or the version.
+/// A rejection by clap as a failure; `None` for a request for help or the version.
 pub(crate) fn wrong_usage(error: &Error) -> Option<Failure> {
     if error.kind() == ErrorKind::InvalidUtf8 {
         return Some(not_utf8());
@@ -40,7 +40,7 @@ pub(crate) fn wrong_usage(error: &Error) -> Option<Failure> {
         .then(|| Failure::usage(code(error.kind()), message(&text)))
 }
 
-/// The first argument of the process that is no UTF-8.
+/// The first argument of the process that is not UTF-8.
 fn not_utf8() -> Failure {
     let mut all = std::env::args_os().skip(1);
     let wrong = all.find(|arg| arg.to_str().is_none());
@@ -64,7 +64,7 @@ fn code(kind: ErrorKind) -> ErrorCode {
     }
 }
 
-/// The first paragraph of clap's text, and behind a semicolon its tip or, without one, the usage.
+/// The first paragraph of clap's text, and after a semicolon its tip or, without one, the usage.
 fn message(text: &str) -> String {
     let mut paragraphs = text.split("\n\n").map(|paragraph| {
         let words: Vec<&str> = paragraph.split_whitespace().collect();

@@ -35,38 +35,38 @@ use crate::stand::{self, Calibration, Stand, TorqueStd};
 /// Frequencies at which the report gives the gain, as fractions of the band.
 const GAIN_POINTS: usize = 9;
 
-/// What is read before anything is written.
+/// Inputs read before anything is written.
 struct Opened {
     stand: Stand,
     stream: ChannelStream,
     chain: Calibration,
 }
 
-/// All that is settled before the first sample is compensated.
+/// Settings fixed before the first sample is compensated.
 struct Plan {
     stream: ChannelStream,
     stand: Stand,
     chain: Calibration,
     filter: InverseFilter,
-    /// Its band, and where it comes from.
+    /// Its band and the origin of the band.
     band: BandReport,
-    /// The inverse of effects that no filter describes, if there are any.
+    /// The inverse of effects that no filter describes, if any.
     undo: Option<ChainInverse>,
 }
 
-/// What the reader found, and the samples that the quality of the record is judged by.
+/// Findings of the reader, and the samples for judging the quality of the record.
 struct Seen {
     summary: StreamSummary,
     /// The first samples, converted, as they were recorded.
     excerpt: Vec<f64>,
-    /// What was looked for in all of them.
+    /// Results of the checks of all samples.
     faults: Faults,
 }
 
 /// Compensates one record.
 ///
 /// # Errors
-/// Whatever kept it from being done.
+/// If the work cannot be done.
 pub fn work(args: &cli::Compensate) -> Result<Made, Failure> {
     if args.json && args.result.is_stdout() {
         return Err(Failure::usage(
@@ -113,7 +113,7 @@ pub fn work(args: &cli::Compensate) -> Result<Made, Failure> {
     })
 }
 
-/// A record of speed or acceleration holds no constant torque, and what is slow drowns in its drift.
+/// A record of speed or acceleration contains no constant torque, and its drift masks slow changes.
 fn refuse_derivative(stand: &Stand) -> Result<(), Failure> {
     match stand.mechanics()?.measures {
         Motion::Displacement => Ok(()),
@@ -185,7 +185,7 @@ impl Plan {
         })
     }
 
-    /// The report as far as it is known before the run.
+    /// The report as far as known before the run.
     fn describe(&self, args: &cli::Compensate, output: &str) -> CompensateReport {
         let (stream, chain, band) = (&self.stream, &self.chain, self.filter.band());
         let edge_s = self.filter.half_length() as f64 / band.sample_rate_hz();
@@ -233,7 +233,7 @@ impl Plan {
         }
     }
 
-    /// Standard uncertainty at a frequency; none where no filter describes the stand.
+    /// Standard uncertainty at a frequency; none if no filter describes the stand.
     fn std(&self, frequency_hz: f64) -> TorqueStd {
         match self.undo {
             None => self.stand.torque_std(frequency_hz, self.chain.std),

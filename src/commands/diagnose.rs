@@ -1,4 +1,4 @@
-//! `diagnose`: what the stand lacks, and the error before and after it is added.
+//! `diagnose`: effects missing from the stand model, and the error before and after adding them.
 
 mod decays;
 mod declared;
@@ -75,7 +75,7 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     ))
 }
 
-/// Where the page comes from.
+/// Provenance of the page.
 fn provenance(args: &Diagnose, stand: Option<&(Stand, String)>) -> Result<Provenance, Failure> {
     let stand = stand.map(|(stand, text)| (stand.file.as_str(), text.as_str()));
     Provenance::of(&args.records(), stand)

@@ -14,7 +14,7 @@ use crate::recording::{Block, ChannelStream, StreamSummary, UniformStream};
 /// Writes the channel of one record.
 ///
 /// # Errors
-/// Whatever kept it from being done.
+/// If the work cannot be done.
 pub fn work(args: &Extract) -> Result<Made, Failure> {
     let OneChannel {
         choice, reading, ..
@@ -66,7 +66,7 @@ fn heading(stream: &ChannelStream) -> Vec<u8> {
     if let Some(unit) = &stream.unit {
         name = format!("{name} [{}]", unit.text);
     }
-    // A spreadsheet would take it for a formula.
+    // A spreadsheet would interpret it as a formula.
     if name.starts_with(['=', '+', '-', '@', '\t']) {
         name.insert(0, '\'');
     }

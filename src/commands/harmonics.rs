@@ -116,7 +116,7 @@ struct ComponentTorque {
 /// Fits the components of one record.
 ///
 /// # Errors
-/// Whatever kept it from being done.
+/// If the work cannot be done.
 pub fn work(args: &cli::Harmonics) -> Result<Made, Failure> {
     let stand = args.stand.as_deref().map(stand::read).transpose()?;
     let OneChannel {
@@ -151,10 +151,10 @@ pub fn work(args: &cli::Harmonics) -> Result<Made, Failure> {
     })
 }
 
-/// From the record to the torque that acted.
+/// Conversion of the record to the applied torque.
 struct WayBack {
     chain: Calibration,
-    /// The stand and its inverse response; none for a record that is compensated already.
+    /// The stand and its inverse response; none for a compensated record.
     stand: Option<(Stand, Inverse)>,
 }
 
@@ -204,7 +204,7 @@ impl WayBack {
     }
 }
 
-/// What was lost comes first, then what is known of the record, its stand and its channel.
+/// Warnings, first about losses, then about the record, its stand and its channel.
 fn of_inputs(way: &WayBack, record: &UniformRecord<Spool>) -> Vec<Warning> {
     let of_stand = way.stand.iter().flat_map(|(stand, _)| &stand.warnings);
     let lost = record.summary.lost.iter();
@@ -212,8 +212,8 @@ fn of_inputs(way: &WayBack, record: &UniformRecord<Spool>) -> Vec<Warning> {
     said.chain(&way.chain.warnings).cloned().collect()
 }
 
-/// The moment at which the phases hold, and the time of the first sample after it in s. Far from zero, a phase there would
-/// be an extrapolation over many periods.
+/// The reference time of the phases, and the time of the first sample after it in s. Far from zero, phases at zero
+/// would be extrapolated over many periods.
 fn phase_reference(start: Moment, duration_s: f64) -> (Moment, f64) {
     match start.seconds().abs() > FAR_FROM_ZERO * duration_s {
         true => (start, 0.0),
@@ -221,7 +221,7 @@ fn phase_reference(start: Moment, duration_s: f64) -> (Moment, f64) {
     }
 }
 
-/// The fundamental that fits the record best, near the given one.
+/// The best-fitting fundamental near the given one.
 fn refined(
     args: &cli::Harmonics,
     record: &UniformRecord<Spool>,
@@ -299,7 +299,7 @@ fn fit(
     })
 }
 
-/// Whether the speed stays, and is the one that was given, and whether all orders are in the band of a compensated record.
+/// Checks that the speed is constant and as given, and that all orders are in the band of a compensated record.
 fn of_orders(
     way: &WayBack,
     record: &UniformRecord<Spool>,
@@ -309,7 +309,7 @@ fn of_orders(
     let hz = fundamental.frequency_hz;
     let is_given = fundamental.std_hz.is_none();
     let load = speed::load_changes(record, hz, orders);
-    // A load step leaves slow parts that bias the speed a little.
+    // A load step leaves slow components that bias the speed slightly.
     let off = is_given.then(|| speed::off(record, hz, orders, load.is_some()));
     let off = off.flatten();
     let changing = speed::warning(record, hz, orders);
@@ -322,7 +322,7 @@ fn of_orders(
     all.into_iter().flatten().collect()
 }
 
-/// What the samples themselves show.
+/// Warnings from the samples themselves.
 fn of_quality(
     record: &UniformRecord<Spool>,
     channel: &str,
@@ -349,7 +349,7 @@ fn of_quality(
     Ok(found)
 }
 
-/// The largest torque of the record or of one of its components, in the printed unit.
+/// The largest torque of the record or one of its components, in the printed unit.
 fn largest(samples: &Spool, components: &[ComponentTorque], printed: f64) -> Result<f64, Failure> {
     let mut largest = components.iter().map(|c| c.torque).fold(0.0, f64::max);
     samples.pass(0..samples.count(), &mut |_, piece| {
@@ -359,7 +359,7 @@ fn largest(samples: &Spool, components: &[ComponentTorque], printed: f64) -> Res
     Ok(largest)
 }
 
-/// Orders below half the sampling rate; those above are said.
+/// Orders below the Nyquist frequency; those above are reported.
 fn visible_orders(
     args: &cli::Harmonics,
     rate_hz: f64,

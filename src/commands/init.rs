@@ -1,4 +1,4 @@
-//! `init`: a commented stand file for what the user has.
+//! `init`: a commented stand file from the data the user has.
 
 mod questions;
 
@@ -16,7 +16,7 @@ use torqcomp_model::Kind;
 use crate::failure::{ErrorCode, Failure};
 use crate::stand::{self, TransducerSignal};
 
-/// Sections as the file has them, each with the line above it.
+/// Sections in the order of the file, each with the comment above it.
 const SECTIONS: [(&str, &str); 6] = [
     (
         "mechanics",
@@ -52,14 +52,14 @@ pub fn run(args: &Init) -> Result<Outcome, Failure> {
     Ok(conclude(&stand.warnings, false, &Strictness::default()))
 }
 
-/// A person at a terminal.
+/// A dialogue with a user at a terminal.
 struct Dialogue<R, W> {
     input: R,
     output: W,
 }
 
 impl<R: BufRead, W: Write> Dialogue<R, W> {
-    /// The answer to a question, empty for none; asked again until `check` takes it.
+    /// The answer to a question, empty for none; asked again until `check` accepts it.
     fn ask(
         &mut self,
         question: &str,
@@ -75,7 +75,7 @@ impl<R: BufRead, W: Write> Dialogue<R, W> {
             if self.input.read_line(&mut line).map_err(broken)? == 0 {
                 return Err(Failure::failed(
                     ErrorCode::MissingArgument,
-                    "the answers ended before the last question",
+                    "input ended before the last question",
                 ));
             }
             let answer = line.trim().to_owned();
@@ -95,8 +95,8 @@ fn compose<R: BufRead, W: Write>(
     let from = match (args.from, &mut dialogue) {
         (Some(from), _) => from,
         (None, Some(dialogue)) => {
-            let question = "What do you have: a transducer with its papers, a bridge that was calibrated with weights, \
-                            the drawing of the beam, or is it unknown? (transducer, bridge, drawing, unknown)";
+            let question = "What do you have: a transducer with a data sheet or certificate, a bridge calibrated with \
+                            weights, the drawing of the beam, or none of these? (transducer, bridge, drawing, unknown)";
             let known = |text: &str| source(text).map(|_| ());
             source(&dialogue.ask(question, known)?).map_err(Failure::of(ErrorCode::InvalidValue))?
         }
@@ -136,20 +136,20 @@ fn compose<R: BufRead, W: Write>(
     if let Some(flag) = args.given_beside(from) {
         return Err(Failure::usage(
             ErrorCode::ConflictingArguments,
-            format_args!("--{flag} does not belong to --from {}", word(from)),
+            format_args!("--{flag} does not apply to --from {}", word(from)),
         ));
     }
     if !missing.is_empty() {
         return Err(Failure::usage(
             ErrorCode::MissingArgument,
-            format_args!("--from {} needs also {}", word(from), missing.join(", ")),
+            format_args!("--from {} also needs {}", word(from), missing.join(", ")),
         ));
     }
     beyond_loop(&answers)?;
     Ok(page(args, from, &answers))
 }
 
-/// Refuses an output at rated torque that is written in the place of its change.
+/// Rejects the output at rated torque given instead of its change.
 fn beyond_loop(answers: &[Answer]) -> Result<(), Failure> {
     let text = |key: &str| {
         let found = answers.iter().find(|a| a.question.key == key);
@@ -176,7 +176,7 @@ fn beyond_loop(answers: &[Answer]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The standard uncertainty of an answer: given by a flag, or asked for.
+/// Standard uncertainty of an answer, from a flag or asked for.
 fn std_of<R: BufRead, W: Write>(
     args: &Init,
     (question, value): (&Question, &str),
@@ -210,7 +210,7 @@ impl Answer {
     }
 }
 
-/// What the file says, section by section; what is missing stands there as a comment.
+/// The text of the file by sections; missing ones are given as comments.
 fn page(args: &Init, from: InitFrom, answers: &[Answer]) -> String {
     let name = args.name.as_deref().unwrap_or("my stand");
     let file = args.result.output.as_deref().filter(|file| !is_dash(file));
@@ -243,13 +243,15 @@ fn page(args: &Init, from: InitFrom, answers: &[Answer]) -> String {
     text
 }
 
-/// How `[mechanics]` is found; FILE is the name of the file.
-const NO_MECHANICS: &str = "\n# [mechanics] is the response that is divided out. Record how the stand rings after a tap, and run\n\
+/// How to obtain `[mechanics]`; FILE is the name of the file.
+const NO_MECHANICS: &str = "\n# [mechanics] is the response that is divided out. Record the ringing of the \
+    stand after a tap, and run\n\
     #     torqcomp identify decay tap.csv -o FILE\n# or write it by hand:\n\
     # [mechanics]\n# natural_frequency = \"590 Hz\"\n# damping_ratio = 0.02\n";
-/// How `[calibration]` is found.
-const NO_CALIBRATION: &str = "\n# [calibration] leads from the record to torque. A record in N m needs none. For one in V, mV/V, mA or Hz load the\n\
-    # stand with known weights, and run\n\
+/// How to obtain `[calibration]`.
+const NO_CALIBRATION: &str = "\n# [calibration] converts the record to torque. A record in N m needs \
+    none. For one in V, mV/V, mA or Hz, load the\n\
+    # stand with known weights and run\n\
     #     torqcomp identify static loads.csv --load LOAD --reading READING --radius \"0.5 m\" -o FILE\n\
     # or write one of these by hand:\n# [calibration]\n# torque_per_volt = \"12.5 N m/V\"\n\
     # torque_per_ratio = \"25 N m/(mV/V)\"\n";
@@ -287,13 +289,13 @@ fn source(text: &str) -> Result<InitFrom, String> {
 }
 
 impl Init {
-    /// What a flag says.
+    /// Value of a flag.
     fn given(&self, flag: &str) -> Option<&str> {
         let found = self.flags().into_iter().find(|(name, _)| *name == flag)?;
         found.1
     }
 
-    /// A flag that was given and that such a file has no place for.
+    /// A given flag that does not apply to such a file.
     fn given_beside(&self, from: InitFrom) -> Option<&'static str> {
         let known: Vec<&str> = of(from).iter().chain(&MECHANICS).map(|q| q.flag).collect();
         let mut given = self.flags().into_iter().filter(|(_, text)| text.is_some());
@@ -302,13 +304,13 @@ impl Init {
             .map(|(flag, _)| flag)
     }
 
-    /// The standard uncertainty that is given for a flag.
+    /// The standard uncertainty given for a flag.
     fn given_std(&self, flag: &str) -> Option<&str> {
         let found = self.std.iter().find(|(name, _)| name == flag)?;
         Some(&found.1)
     }
 
-    /// Refuses a standard uncertainty of what is not given or has none.
+    /// Rejects a standard uncertainty for a value that is not given or takes none.
     fn check_stds(&self, answers: &[Answer]) -> Result<(), Failure> {
         for (flag, std) in &self.std {
             let answer = answers.iter().find(|a| a.question.flag == flag);
@@ -316,7 +318,7 @@ impl Init {
                 return Err(Failure::usage(
                     ErrorCode::ConflictingArguments,
                     format_args!(
-                        "--std {flag}={std}: --{flag} is not given, or takes no uncertainty"
+                        "--std {flag}={std}: --{flag} is not given, or has no uncertainty"
                     ),
                 ));
             };
@@ -369,7 +371,7 @@ mod tests {
         let Verb::Init(args) = cli.verb else {
             unreachable!()
         };
-        // Each quantity is followed by its standard uncertainty; that of the given torque is asked for, too.
+        // Each quantity is followed by its standard uncertainty, also for the torque given by a flag.
         let answers = "data sheet\ntransducer\n2 mV/V\n\n\n\n\n\n590\n590 Hz\n1 Hz\n0.02\n\n";
         let mut said = Vec::new();
         let mut dialogue = Dialogue {

@@ -42,7 +42,7 @@ pub fn run(args: &Man) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// The command line as the pages have it. The commit is no part of them: they are the same for each build of a version.
+/// The command line as in the pages, without the commit: the pages are the same for each build of a version.
 fn command() -> Command {
     let mut command = crate::cli::command()
         .long_version(env!("CARGO_PKG_VERSION"))
@@ -55,7 +55,7 @@ fn names_a_folder(path: &Path) -> bool {
     path.is_dir() || file_name::ends_with_separator(path)
 }
 
-/// The verb with these words.
+/// The verb named by these words.
 fn find<'a>(program: &'a Command, words: &[String]) -> Result<&'a Command, Failure> {
     let mut found = program;
     for word in words {
@@ -95,7 +95,7 @@ fn write_all(args: &Man, folder: &Path, pages: &[(String, Vec<u8>)]) -> Result<(
     output::finish_all(outputs)
 }
 
-/// A page, as `man` reads it.
+/// A page in roff, for `man`.
 fn page(command: &Command) -> Vec<u8> {
     let renderer = Renderer::new(command.clone())
         .source(concat!("torqcomp ", env!("CARGO_PKG_VERSION")))
@@ -137,7 +137,7 @@ fn page(command: &Command) -> Vec<u8> {
 mod tests {
     use super::*;
 
-    /// A page as a person reads it, without the marks of roff.
+    /// A page as plain text, without roff markup.
     fn plain(page: &[u8]) -> String {
         let text = String::from_utf8(page.to_vec()).unwrap();
         let text = text.replace("\\-", "-").replace("\\*(Aq", "'");
@@ -162,7 +162,7 @@ mod tests {
         }
     }
 
-    /// The words that name a verb.
+    /// The words naming a verb.
     fn words(verb: &Command) -> Vec<String> {
         let path = verb.get_bin_name().unwrap();
         path.split(' ').skip(1).map(str::to_owned).collect()
@@ -183,7 +183,7 @@ mod tests {
             lines[0].starts_with("  torqcomp compensate run.csv --stand"),
             "{text}"
         );
-        // The backslash at the end of a line is one for the shell.
+        // The backslash at the end of a line is for the shell.
         assert!(lines[1].ends_with("\\\\"), "{text}");
         assert_eq!(lines.last(), Some(&".fi"));
     }

@@ -1,4 +1,4 @@
-//! Verbs that read one recording at a time, and so take many.
+//! Verbs that read one recording at a time, and therefore accept many.
 
 use std::path::{Path, PathBuf};
 
@@ -14,13 +14,13 @@ use crate::stand;
 
 /// A verb that reads one recording at a time.
 pub(super) trait OneByOne: Clone + Sync {
-    /// What is asked for, of many recordings.
+    /// Arguments for many recordings.
     fn task(&self) -> BatchTask<'_>;
 
-    /// What one of them has for itself.
+    /// Arguments of a single recording.
     fn own(&mut self) -> Own<'_>;
 
-    /// The same of one of them.
+    /// The same verb for a single recording.
     fn of_one(&self, one: &OneRun) -> Self {
         let mut args = self.clone();
         let own = args.own();
@@ -41,19 +41,19 @@ pub(super) trait OneByOne: Clone + Sync {
     fn work(&self) -> Result<Made, Failure>;
 }
 
-/// The arguments that differ from recording to recording.
+/// Arguments that differ between recordings.
 pub(super) struct Own<'a> {
     inputs: &'a mut Vec<PathBuf>,
     many: &'a mut BatchOptions,
     result: &'a mut OutputArgs,
-    /// Where what is written beside the result goes, in the order of [`BatchTask::beside`].
+    /// Additional outputs besides the result, in the order of [`BatchTask::beside`].
     beside: Vec<&'a mut PathBuf>,
-    /// Of a verb that shares its work on one recording among threads.
+    /// For a verb that shares its work on one recording among threads.
     threads: Option<&'a mut Option<u16>>,
 }
 
 impl<'a> Own<'a> {
-    /// Of a verb with one result, on one thread.
+    /// For a verb with one result, on one thread.
     fn of(
         inputs: &'a mut Vec<PathBuf>,
         many: &'a mut BatchOptions,
@@ -69,13 +69,13 @@ impl<'a> Own<'a> {
     }
 }
 
-/// Whether these arguments ask for many recordings, each by itself.
+/// Whether these arguments request separate processing of many recordings.
 pub(super) fn are_asked(args: &impl OneByOne) -> bool {
     let task = args.task();
     batch::is_asked(task.inputs, task.many, task.result)
 }
 
-/// Runs a verb over one recording or many; `options` are those that its results may depend on.
+/// Runs a verb on one recording or many; `options` are those that may affect its results.
 pub(super) fn run(args: &impl OneByOne, options: &[String]) -> Result<Outcome, Failure> {
     let task = args.task();
     if !are_asked(args) && !batch::is_several(task.inputs) {
@@ -88,14 +88,14 @@ pub(super) fn run(args: &impl OneByOne, options: &[String]) -> Result<Outcome, F
         )
         .at(folder.shown()));
     }
-    // A fault of the stand file would be said for each recording.
+    // A fault in the stand file would be reported for each recording.
     if let Some(path) = task.stand {
         stand::read(path)?;
     }
     batch::run(&task, options, &|one| args.of_one(one).work())
 }
 
-/// Names and values of the options that are given.
+/// Names and values of the given options.
 fn given<'a, const N: usize>(
     options: [(&'static str, Option<&'a Path>); N],
 ) -> Vec<(&'static str, &'a Path)> {

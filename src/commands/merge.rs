@@ -1,4 +1,4 @@
-//! `merge`: the table of a job out of the manifests of its runs.
+//! `merge`: the table of a job from the manifests of its runs.
 
 use std::path::Path;
 

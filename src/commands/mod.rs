@@ -1,4 +1,4 @@
-//! The verbs, each a page: what it was asked, what it plans, what it computes, what it reports.
+//! The verbs, a module each: arguments, plan, computation, report.
 
 mod compensate;
 mod completions;
@@ -32,7 +32,7 @@ use crate::warning::Warning;
 /// Runs a command.
 ///
 /// # Errors
-/// Whatever kept it from being done.
+/// If the work cannot be done.
 pub fn run(cli: Cli) -> Result<Outcome, Failure> {
     match cli.verb {
         Verb::Init(args) => init::run(&args),
@@ -58,7 +58,7 @@ fn publish(report: &impl Report, as_json: bool, mut output: Output) -> Result<()
     output.finish()
 }
 
-/// Says the warnings, what was lost among them, and how the command ended.
+/// Prints the warnings, including losses, and returns the outcome of the command.
 fn conclude(warnings: &[Warning], lost: bool, strictness: &Strictness) -> Outcome {
     print::say(&warned(warnings));
     log::warnings(None, warnings);
@@ -71,7 +71,7 @@ fn warned(warnings: &[Warning]) -> String {
     warnings.iter().map(line).collect()
 }
 
-/// How a command ended.
+/// Outcome of a command.
 fn judged(warnings: &[Warning], lost: bool, strictness: &Strictness) -> Outcome {
     match lost || strictness.refuses(warnings.iter().map(|w| w.code)) {
         true => Outcome::WithLoss,
@@ -84,11 +84,11 @@ fn unit_text(unit: Option<&NamedUnit>) -> &str {
     unit.map_or("", |unit| &unit.text)
 }
 
-/// Largest magnitude that is taken for a measurement: squares and sums of it stay finite.
+/// Largest magnitude accepted as a measurement: its squares and sums stay finite.
 const LARGEST: f64 = 1e100;
 
-/// Brings recorded values to the applied quantity at rest, in SI units; index and reason of the
-/// first that cannot be.
+/// Converts recorded values to the static applied quantity, in SI units; index and reason of the
+/// first that cannot be converted.
 pub(crate) fn convert(chain: &Calibration, values: &mut [f64]) -> Result<(), (usize, String)> {
     if chain.recorded_factor != 1.0 {
         values.iter_mut().for_each(|v| *v *= chain.recorded_factor);
@@ -118,7 +118,7 @@ pub(crate) fn convert(chain: &Calibration, values: &mut [f64]) -> Result<(), (us
     }
 }
 
-/// Index of the first value that is no measurement. Looks at many at once, since there is none.
+/// Index of the first value that is not a measurement. Checks many at once, as there is usually none.
 fn first_impossible(values: &[f64]) -> Option<usize> {
     const TOGETHER: usize = 64;
     let is_possible = |v: &f64| v.abs() <= LARGEST;

@@ -1,4 +1,4 @@
-//! `predict`: what follows from the drawing, beside what was measured.
+//! `predict`: constants from the drawing compared with the measured ones.
 
 mod calibration;
 mod report;
@@ -16,11 +16,11 @@ use crate::failure::{ErrorCode, Failure};
 use crate::print::rounded;
 use crate::stand::{self, BeamDrawing, BridgeData, Given, Stand, TransducerSignal};
 
-/// Part of a residual that must be left at most for an effect to explain it.
+/// Maximum remaining fraction of a residual for an effect to explain it.
 const EXPLAINED: f64 = 0.5;
-/// Predicted over measured damping below which the drawing misses the loss altogether.
+/// Predicted over measured damping below which the drawing does not account for the loss at all.
 const FAR_TOO_SMALL: f64 = 0.1;
-/// Factor between measured and predicted torque per volt from which it needs a remark.
+/// Factor between measured and predicted torque per volt from which a remark is given.
 const LARGE_FACTOR: f64 = 1.5;
 
 /// Runs the verb.
@@ -179,7 +179,7 @@ impl<'a> Drawing<'a> {
         Ok([natural, damping_ratio])
     }
 
-    /// An estimate that follows from others, if all of them are there.
+    /// An estimate derived from others, if all of them are available.
     fn derive(
         &self,
         kind: Kind,
@@ -194,7 +194,7 @@ impl<'a> Drawing<'a> {
             .map_err(|error| Failure::failed(ErrorCode::InvalidStand, error).at(&self.stand.file))
     }
 
-    /// Adds what each effect of the drawing makes of a constant that follows from the stiffness.
+    /// Adds the contribution of each effect of the drawing to a constant derived from the stiffness.
     fn refine(&self, constant: &mut PredictedConstant, by_stiffness: impl Fn(f64) -> Option<f64>) {
         let refined = self.stiffness.as_ref().map_or(&[][..], |s| &s.refined);
         for (effect, stiffness) in refined {
@@ -246,7 +246,7 @@ impl<'a> Drawing<'a> {
             let made = Estimate::new(Kind::TorquePerVolt, gain, None, "drawing");
             predicted = Some(made.map_err(Failure::of(ErrorCode::InvalidStand))?);
         }
-        // Of a calibration in mV/V through gain and supply.
+        // From a calibration in mV/V with gain and supply.
         let by_ratio = || {
             let (slope, relative) = stand.measured_slope(TransducerSignal::Voltage)?;
             let std = relative.map(|relative| (relative * slope).abs());
@@ -269,7 +269,7 @@ impl<'a> Drawing<'a> {
         Ok(made)
     }
 
-    /// What can contribute to a large factor, none of which the record can tell from the others.
+    /// Possible contributions to a large factor, indistinguishable in the record.
     fn torque_per_volt_note(
         &self,
         predicted: f64,
@@ -370,7 +370,7 @@ impl Measured {
                 damping_ratio: Some(damping_ratio.clone()),
                 ..Self::default()
             }),
-            // Constants of one inertia on one spring have no counterpart among several modes.
+            // Constants of one inertia on one spring have no counterpart with several modes.
             Given::Modes(_) => Ok(Self::default()),
         }
     }

@@ -1,4 +1,4 @@
-//! The rows of a result as text.
+//! Rows of a result as text.
 
 use std::ops::Range;
 
@@ -10,10 +10,10 @@ use crate::recording::moment::Moment;
 use crate::recording::text::place_of;
 use crate::recording::{Block, StampGrid};
 
-/// Rows whose numbers are taken apart together.
+/// Number of rows whose numbers are decomposed together.
 const ROWS_TOGETHER: usize = 8;
 
-/// Writes the rows of a result: time, torque, and the recorded torque if it is wanted.
+/// Writes the rows of a result: time, torque and, if requested, the recorded torque.
 pub(super) struct Rows<'a> {
     pub(super) digits: Digits,
     /// Printed units per SI unit.
@@ -22,13 +22,13 @@ pub(super) struct Rows<'a> {
     pub(super) times: Times<'a>,
 }
 
-/// Where the text of the time column comes from.
+/// Source of the text of the time column.
 pub(super) enum Times<'a> {
     /// Copied from the input.
     Copied { text: &'a [u8], spans: &'a [u64] },
-    /// Stamps in another unit, times seconds per unit.
+    /// Time stamps in another unit, multiplied by seconds per unit.
     Stamps { times: &'a [f64], seconds: f64 },
-    /// Stamps that count from an origin.
+    /// Time stamps relative to an origin.
     Counted {
         times: &'a [f64],
         grid: &'a StampGrid,
@@ -37,7 +37,7 @@ pub(super) enum Times<'a> {
     Grid { start: Moment, first: usize },
 }
 
-/// Rows that are written at once.
+/// Number of rows written at once.
 const ROWS_AT_ONCE: usize = 1 << 14;
 
 /// The parts of some samples of a record on a uniform time axis, each with the range of its samples.
@@ -104,8 +104,8 @@ impl<'a> Times<'a> {
 }
 
 impl Rows<'_> {
-    /// Digits that tell a thousandth of a step at the time of the last row. Epoch stamps need more
-    /// than a record that begins at zero.
+    /// Digits that resolve a thousandth of a step at the time of the last row. Epoch stamps need more
+    /// than a record that starts at zero.
     fn time_digits(&self, rows: usize) -> Digits {
         let (Some(last), rate_hz) = (rows.checked_sub(1), self.rate_hz) else {
             return digits::DEFAULT_DIGITS;
@@ -118,7 +118,7 @@ impl Rows<'_> {
         }
     }
 
-    /// Appends the rows of `torque`, beside `recorded` if that is not empty.
+    /// Appends the rows of `torque`, with `recorded` if not empty.
     pub(super) fn write(&self, out: &mut Text, torque: &[f64], recorded: &[f64]) {
         let time_digits = self.time_digits(torque.len());
         let Digits::Significant(count) = self.digits else {
@@ -130,7 +130,7 @@ impl Rows<'_> {
             return;
         };
         if count == digits::DEFAULT_COUNT {
-            // The same code, with the number of digits known while it is compiled.
+            // The same code, with the number of digits known at compile time.
             self.write_rows(out, torque, recorded, digits::DEFAULT_COUNT, time_digits);
         } else {
             self.write_rows(out, torque, recorded, count, time_digits);

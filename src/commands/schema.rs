@@ -1,4 +1,4 @@
-//! `schema`: the JSON Schema of what `--json` prints.
+//! `schema`: the JSON Schema of the `--json` documents.
 
 #[cfg(test)]
 pub(crate) mod types;
@@ -31,16 +31,16 @@ use crate::progress::ProgressLine;
 
 /// A kind of document.
 pub(crate) struct DocumentKind {
-    /// The verb, or what the document is of.
+    /// The verb, or the subject of the document.
     pub(crate) name: &'static str,
-    /// Name and version, as the document itself says them.
+    /// Name and version as in the document itself.
     pub(crate) schema: &'static str,
-    /// The JSON Schema (2020-12), written from the types.
+    /// The JSON Schema (2020-12), generated from the types.
     pub(crate) text: &'static str,
 }
 
 impl DocumentKind {
-    /// What it is, in a sentence.
+    /// Description in one sentence.
     pub(crate) fn about(&self) -> String {
         let schema: Option<Value> = serde_json::from_str(self.text).ok();
         let about = schema
@@ -108,7 +108,7 @@ fn find(name: &str) -> Result<&'static DocumentKind, Failure> {
         })
 }
 
-/// Names of the documents and what they are, a line each.
+/// Names and descriptions of the documents, one per line.
 fn list() -> String {
     let width = |text: fn(&DocumentKind) -> &'static str| {
         DOCUMENTS

@@ -1,4 +1,4 @@
-//! `simulate`: the stand's answer to a given input.
+//! `simulate`: the stand's response to a given input.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -52,10 +52,10 @@ pub(super) struct SimulateReport {
     warnings: Vec<Warning>,
 }
 
-/// Simulates the answer to one record.
+/// Simulates the response to one record.
 ///
 /// # Errors
-/// Whatever kept it from being done.
+/// If the work cannot be done.
 pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
     let stand = stand::read(&args.stand)?;
     if args.json && args.result.is_stdout() {
@@ -111,7 +111,7 @@ pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
     Ok(made(args, report, output, is_lossy))
 }
 
-/// The record that was written, and what is said of it.
+/// The written record and its report.
 fn made(args: &cli::Simulate, report: SimulateReport, output: Output, is_lossy: bool) -> Made {
     let notes = match args.json {
         true => String::new(),
@@ -132,7 +132,7 @@ fn made(args: &cli::Simulate, report: SimulateReport, output: Output, is_lossy: 
     }
 }
 
-/// Gives the steady answer to the applied quantity, repeated; steps of integration from sample to sample.
+/// Computes the steady-state response to the repeated applied quantity; returns integration steps per sample.
 fn simulate_steady(
     applied: &mut AppliedInput,
     factor: f64,
@@ -152,7 +152,7 @@ fn simulate_steady(
     Ok(steps)
 }
 
-/// Sends the applied quantity through the stand piece by piece; steps of integration from sample to sample.
+/// Passes the applied quantity through the stand piece by piece; returns integration steps per sample.
 fn simulate(
     applied: &mut AppliedInput,
     factor: f64,
@@ -179,7 +179,7 @@ fn simulate(
     Ok(steps)
 }
 
-/// The applied quantity, in the unit of the file, as it is read.
+/// The applied quantity as read, in the unit of the file.
 struct AppliedInput {
     name: String,
     unit: Option<NamedUnit>,
@@ -188,12 +188,12 @@ struct AppliedInput {
     /// Standard uncertainty of the rate, if it comes from stamps.
     rate_std_hz: Option<f64>,
     samples: AppliedSamples,
-    /// What should be known of the file, once all of it is read; what was lost comes first.
+    /// Warnings about the file after reading all of it; losses come first.
     warnings: Vec<Warning>,
     is_lossy: bool,
 }
 
-/// Where the samples come from: messages are interpolated in memory where their stamps are not uniform.
+/// Source of the samples: messages with non-uniform time stamps are interpolated in memory.
 enum AppliedSamples {
     Text(Option<Box<UniformStream>>),
     Messages(Vec<f64>),
@@ -245,7 +245,7 @@ impl AppliedInput {
         }
     }
 
-    /// Samples a second, and the time of the first sample.
+    /// Samples per second, and the time of the first sample.
     fn axis(&self) -> (f64, Moment) {
         self.axis
     }
@@ -316,7 +316,7 @@ struct ChannelUnits {
     applied_text: String,
     /// SI units per unit of the result.
     measured: f64,
-    /// What makes torque of the result, if it is in another unit.
+    /// Conversion of the result to torque, if it is in another unit.
     calibration: Option<Calibration>,
     measured_text: String,
 }
@@ -337,7 +337,7 @@ impl ChannelUnits {
             (None, None) => applied.text.clone(),
         };
         let unit = Unit::parse(&text).map_err(Failure::of(ErrorCode::UnitUnclear))?;
-        // A record of another unit than torque is what the calibration makes torque of.
+        // A record in another unit than torque is converted to torque by the calibration.
         let is_signal = gain.is_none() && TransducerSignal::of(&unit).is_some();
         let named = NamedUnit {
             text: text.clone(),
@@ -361,7 +361,7 @@ impl ChannelUnits {
         })
     }
 
-    /// Brings simulated torques to what is recorded of them, in the unit of the result.
+    /// Converts simulated torques to their record, in the unit of the result.
     fn record(&self, simulated: &mut [f64], offset: f64) -> Result<(), Failure> {
         for value in simulated {
             let torque = *value + offset;
@@ -378,7 +378,7 @@ impl ChannelUnits {
     }
 }
 
-/// The unit of the applied column, which must be one that the stand takes.
+/// The unit of the applied column, which must suit the stand.
 fn applied_unit(
     chosen: RecordedChannel<'_>,
     expected: &str,

@@ -12,7 +12,7 @@ use crate::identify::Motion;
 use crate::print::{Report, rounded};
 use crate::stand::{self, Mechanics, Stand};
 
-/// Most rows of a table.
+/// Maximum number of rows of a table.
 const MOST_ROWS: f64 = 1e7;
 /// Significant digits of the table.
 const DIGITS: u32 = 10;
@@ -88,7 +88,7 @@ fn row(
     let recorder = &stand.recorder.recorder;
     let mechanical = mechanics.response.inverse(frequency_hz);
     let recorded = recorder.response(frequency_hz);
-    // Of effects there is no more than the response, so that only their own phase folds.
+    // Effects give only a response, so only their own phase is wrapped.
     let of_effects = refined.map(|inverse| inverse(frequency_hz) * recorded / mechanical);
     let (more, phase_of_effects) = of_effects.unwrap_or(Complex64::ONE).to_polar();
     let magnitude = more * mechanical.norm() / recorded.norm();
@@ -113,7 +113,7 @@ impl Report for TableReport {
         }
         text.push('\n');
         for row in &self.rows {
-            // Where nothing passes, there is no inverse: an empty cell.
+            // Without transmission there is no inverse: an empty cell.
             let cell = |value: f64| match value.is_finite() {
                 true => rounded(value, DIGITS),
                 false => String::new(),

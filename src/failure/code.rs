@@ -1,4 +1,4 @@
-//! The kinds of failures.
+//! Kinds of failure.
 
 use schemars::JsonSchema;
 use serde::Serialize;

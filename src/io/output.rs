@@ -312,7 +312,7 @@ fn folder_failure(path: &Path, error: &io::Error) -> Failure {
         Failure::failed(
             ErrorCode::CannotWrite,
             format_args!(
-                "the folder {} does not exist; make it first",
+                "the folder {} does not exist; create it first",
                 folder.shown()
             ),
         )

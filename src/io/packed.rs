@@ -92,8 +92,8 @@ impl Unpacked {
         io::Error::new(
             io::ErrorKind::InvalidData,
             format!(
-                "its {name} data are damaged ({why}); copy it again, or save what is whole with {name} -dc FILE > NEW and \
-                 read that"
+                "its {name} data are damaged ({why}); copy it again, or save the intact part with {name} -dc FILE > \
+                 NEW and read that"
             ),
         )
     }

@@ -1,5 +1,5 @@
-"""Writes the samples of binary formats in tests/recordings by the packages that their users know, and prints what these
-packages read from them again: sums of each channel, which expected.toml must have.
+"""Writes the binary-format samples in tests/recordings with common Python packages, reads them back with these
+packages and prints the sum of each channel, which expected.toml must contain.
 
 pip install scipy==1.17.1 pyuff==2.5.8 && python tests/proof/formats_make.py tests/recordings
 """
@@ -27,7 +27,7 @@ for name in ["scipy_16_bit", "scipy_32_bit", "scipy_float"]:
     full = {np.dtype("int16"): 2.0**15, np.dtype("int32"): 2.0**31}.get(samples.dtype, 1.0)
     print(name, read_rate, np.atleast_2d(samples.T).astype(float).sum(axis=1) / full)
 
-# MATLAB 5: a vector of time, or a rate.
+# MATLAB 5: a time vector, or a rate.
 savemat(folder / "scipy_time.mat", {"time_s": t, "torque_Nm": torque, "speed": speed, "note": "a text", "gain": 10.0})
 savemat(
     folder / "scipy_rate_compressed.mat",

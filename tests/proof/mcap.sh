@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# MCAP files written by the public Python packages of ROS 2, ROS 1, protobuf and JSON are read with
-# torqcomp, and what torqcomp writes is read with theirs: values equal to the last bit.
+# Reads MCAP files written by the public Python packages for ROS 2, ROS 1, protobuf and JSON with
+# torqcomp, and files written by torqcomp with those packages: values equal to the last bit.
 #
 # Needs python3 with venv and a package index. Usage: tests/proof/mcap.sh [path/to/torqcomp]
 set -euo pipefail
@@ -20,7 +20,7 @@ fi
 "$venv/bin/python" tests/proof/mcap_make.py "$work"
 "$venv/bin/python" tests/proof/mcap_read.py "$work" "$torqcomp"
 "$venv/bin/python" tests/proof/mcap_write.py "$work" "$torqcomp"
-# The official readers for JavaScript, which check every checksum.
+# The official JavaScript readers, which verify every checksum.
 if command -v npm >/dev/null && command -v node >/dev/null; then
     cp tests/proof/mcap_check.mjs "$work"
     (cd "$work" && npm install --silent --no-audit --no-fund @mcap/core@2 @mcap/support@1 >/dev/null)
@@ -28,8 +28,8 @@ if command -v npm >/dev/null && command -v node >/dev/null; then
 else
     echo "SKIPPED: node and npm are not installed; the files were not read with @mcap/core"
 fi
-# The official command-line tool. No registry has it (crates.io, npm, PyPI, Debian; the Go proxy has no
-# version of it), so that it runs only where it was installed from its own releases.
+# The official command-line tool. It is in no registry (crates.io, npm, PyPI, Debian; the Go proxy has no
+# version of it), so it runs only if installed from its own releases.
 if command -v mcap >/dev/null; then
     for file in "$work"/out-*.mcap; do
         mcap doctor --strict-message-order=false "$file"

@@ -1,6 +1,6 @@
-"""Writes MCAP files in all encodings and compressions, and what is in them as CSV beside them.
+"""Writes MCAP files in all encodings and compressions, and their content for comparison.
 
-For every file NAME.mcap a line of cases.json says which topic and field to read; the expected
+For every file NAME.mcap, a line of cases.json gives the topic and field to read; the expected
 times (ns) and values are in NAME.npz.
 """
 
@@ -40,11 +40,11 @@ cases = []
 
 
 def doubles(count):
-    """Doubles of every size, some with all bits of the mantissa in use."""
+    """Doubles of every magnitude, some using all bits of the mantissa."""
     values = []
     while len(values) < count:
         value = struct.unpack("<d", random.randbytes(8))[0]
-        # What is compensated has to be what a recorder can measure.
+        # Compensated values must be measurable by a recorder.
         if value == value and abs(value) < 1e90:
             values.append(value)
     return values
@@ -139,7 +139,7 @@ def outer_by_rosbags(place, value, y):
 def outer_by_hand(kind, largest, has_sizes):
     def inners(cdr, place, y, count, has_count):
         part = Cdr(kind, largest)
-        # Padding counts from the start of the message, so the front is taken along.
+        # Padding counts from the start of the message, so the front is included.
         part.out += cdr.out
         if has_sizes:
             part.put("I", 0)
@@ -348,7 +348,7 @@ def json_file(folder):
 
 
 def shapes(folder):
-    """Files without chunks, without summary, with attachments, with a publisher that started anew, cut off."""
+    """Files without chunks, without summary, with attachments, with a restarted publisher, truncated."""
     variants = {
         "no-chunks": {"use_chunking": False},
         "no-index": {"index_types": IndexType.NONE},
@@ -387,7 +387,7 @@ def shapes(folder):
 
 
 def two_publishers(folder):
-    """Two nodes that publish on one topic at a time: not one signal, so refused."""
+    """Two nodes publishing on one topic at the same time: not one signal, so rejected."""
     with open(folder / "two-publishers.mcap", "wb") as out:
         writer = Writer(out)
         writer.start("ros2", "proof")

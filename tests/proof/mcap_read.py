@@ -1,4 +1,4 @@
-"""Reads every case with torqcomp and compares to the last bit."""
+"""Reads every case with torqcomp and compares it to the last bit."""
 
 import csv
 import json

@@ -1,7 +1,7 @@
-"""Lets torqcomp write an MCAP beside the ones it read, and reads it with the public packages.
+"""Writes an MCAP with torqcomp from each one it read, and reads it with the public packages.
 
-Everything of the input must be in it as it was, and the added channel must hold what torqcomp
-says in its CSV for the same input.
+It must contain everything from the input unchanged, and the added channel must equal the CSV that
+torqcomp writes for the same input.
 """
 
 import csv
@@ -25,7 +25,7 @@ damping_ratio = 0.05
 [calibration]
 torque_per_volt = "100 N m/V"
 """
-# With a torque that no response describes, the record goes a way of its own.
+# With a torque that no response describes, the record takes a separate path.
 REFINED = """
 [[effects]]
 kind = "cubic-stiffness"
@@ -35,7 +35,7 @@ NAMES = ["ros2-none", "ros2-lz4", "ros2-zstd", "ros1", "protobuf-zstd", "json", 
 
 
 def all_messages(reader):
-    """Messages (time, topic, bytes) in an order of their own."""
+    """Messages (time, topic, bytes) in a defined order."""
     return sorted(
         (message.log_time, channel.topic, message.publish_time, message.sequence, message.data)
         for _, channel, message in reader.iter_messages()
@@ -62,7 +62,7 @@ def value(message):
 
 
 class Json:
-    """mcap has no decoder of JSON."""
+    """mcap has no JSON decoder."""
 
     def decoder_for(self, encoding, _schema):
         return json.loads if encoding == "json" else None

@@ -1,9 +1,9 @@
 //! The worked examples in `docs/ways`: every command of a page is run on recordings of known torque, its output
 //! compared with the page, and the final torque with the truth.
 //!
-//! In a block ```` ```console ```` a line `$ torqcomp …` (continued by `\`) is run, and `$ cat FILE` prints a file; what
-//! follows is what they print, standard output first. A block ```` ```toml ```` whose first line is `# FILE` is written to
-//! that file. `SNAPSHOTS=overwrite cargo test --test tests ways` writes what is printed now into the pages.
+//! In a ```` ```console ```` block, a line `$ torqcomp …` (continued by `\`) is run, and `$ cat FILE` prints a file;
+//! the lines below are the output, standard output first. A ```` ```toml ```` block whose first line is `# FILE` is
+//! written to that file. `SNAPSHOTS=overwrite cargo test --test tests ways` updates the pages with the current output.
 
 mod records;
 

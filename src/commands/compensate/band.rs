@@ -1,4 +1,4 @@
-//! The band of a compensation: as given, or chosen from the record and the stand.
+//! Band of a compensation: as given, or chosen from the record and the stand.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -14,14 +14,14 @@ use crate::recording::ChannelStream;
 use crate::stand::Calibration;
 use crate::warning::Warning;
 
-/// The band of `--band rated`, as far as the rate allows: that of the thesis.
+/// The band of `--band rated`, that of the thesis, as far as the rate allows.
 const RATED_BAND_HZ: f64 = 2400.0;
-/// Highest frequency over the rate at which new values come: holding them lowers a sine there by 6 % (sin(πx)/(πx)).
+/// Highest frequency over the rate of new values: holding them reduces a sine there by 6 % (sin(πx)/(πx)).
 const HELD: f64 = 0.2;
-/// Samples that a band is chosen from, at least, if there are so many.
+/// Minimum number of samples for choosing a band, if available.
 const FIRST_SAMPLES: usize = 1 << 17;
 
-/// Part of the result from which a line is asked about.
+/// Fraction of the result from which a line is questioned.
 const MATTERS: f64 = 0.02;
 
 /// The band of a compensation and where it comes from.
@@ -58,7 +58,7 @@ pub(super) enum BandSource {
     Rated,
 }
 
-/// What a band is chosen by.
+/// Criteria for choosing a band.
 pub(super) struct Wanted<'a> {
     pub(super) option: Option<BandOption>,
     pub(super) chain: &'a Calibration,
@@ -66,7 +66,7 @@ pub(super) struct Wanted<'a> {
 }
 
 impl Wanted<'_> {
-    /// The band for a stream, whose first samples are looked at if no band is given.
+    /// The band for a stream, chosen from the first samples if no band is given.
     pub(super) fn choose(&self, stream: &mut ChannelStream) -> Result<(Band, BandReport), Failure> {
         let rate_hz = stream.rate_hz;
         let mut lines = None;
@@ -79,7 +79,7 @@ impl Wanted<'_> {
             ),
             None => {
                 let mut first = stream.first_samples(FIRST_SAMPLES)?;
-                // A sample that cannot be converted is refused where it is compensated.
+                // A sample that cannot be converted is rejected during compensation.
                 if let Err((index, _)) = convert(self.chain, &mut first.values) {
                     first.values.truncate(index);
                 }
@@ -116,7 +116,7 @@ impl Wanted<'_> {
     }
 }
 
-/// Highest frequency that samples show which are held for several steps; `None` if they are not.
+/// Highest frequency resolved by samples held for several steps; `None` if they are not held.
 fn of_held(samples: &[f64], rate_hz: f64) -> Option<f64> {
     let hold = repeats(samples)?.hold?;
     Some(HELD * rate_hz / hold as f64)
@@ -147,7 +147,7 @@ impl BandReport {
         }
     }
 
-    /// A warning if a few lines alone decide it, which may be no torque, and matter in a result of that rms. `scale` is
+    /// A warning if it depends on a few lines alone that may not be torque and matter in a result of this rms. `scale`:
     /// printed units per unit of the lines.
     pub(super) fn question(&self, unit: &str, scale: f64, rms: f64) -> Option<Warning> {
         let lines = self.lines?;
@@ -172,7 +172,7 @@ impl BandReport {
         ))
     }
 
-    /// Whether it was asked for by `--band`.
+    /// Whether it was given by `--band`.
     pub(super) fn is_given(&self) -> bool {
         matches!(self.chosen_from, BandSource::Option | BandSource::Rated)
     }

@@ -1,4 +1,4 @@
-//! Records that are gone through more than once: in one transform over all of them, or back through effects that no filter
+//! Records processed in memory: in one transform of the whole record, or by inverting effects that no filter
 //! describes.
 
 use torqcomp_dsp::compensate::whole_record;
@@ -20,7 +20,7 @@ use crate::quality::excerpt;
 use crate::recording::moment::Moment;
 use crate::recording::{Spool, UniformRecord};
 
-/// Longest block of the noise estimate.
+/// Maximum block length of the noise estimate.
 const LONGEST_BLOCK: usize = 1 << 12;
 
 /// Reads, compensates and writes the record.
@@ -89,7 +89,7 @@ fn density(record: &UniformRecord<Spool>, scale: f64) -> Result<Option<Density>,
     Ok(power.density(record.rate_hz))
 }
 
-/// Writes samples of the result, from a place on, beside those recorded.
+/// Writes samples of the result from a given index on, with the recorded ones.
 fn deliver(
     args: &Compensate,
     sink: &mut Sink,

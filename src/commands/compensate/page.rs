@@ -1,4 +1,4 @@
-//! A compensation as a page for a browser: both signals over time, their spectra, the gain, the band, what was filled in.
+//! HTML report of a compensation: both signals over time, their spectra, the gain, the band, filled-in samples.
 
 use torqcomp_dsp::band::Band;
 use torqcomp_dsp::compensate::InverseFilter;
@@ -15,14 +15,14 @@ use crate::print::{plural, short};
 use crate::provenance::Provenance;
 use crate::stand;
 
-/// Samples of a block of the spectra.
+/// Samples per block of the spectra.
 const BLOCK: usize = 1 << 12;
-/// Frequencies at which the gain is drawn.
+/// Number of frequencies at which the gain is drawn.
 const GAINS: usize = 400;
-/// Stretches whose times the page lists.
+/// Maximum number of stretches whose times the page lists.
 const LISTED: usize = 200;
 
-/// What a page shows, gathered sample by sample in bounded memory.
+/// Content of the page, collected sample by sample in bounded memory.
 pub(super) struct PageData {
     provenance: Provenance,
     traces: Traces,
@@ -184,7 +184,7 @@ fn answer(page: &mut Page, report: &CompensateReport) {
     }
 }
 
-/// The times of what was filled in.
+/// The times of filled-in stretches.
 fn filled(page: &mut Page, report: &CompensateReport) {
     if report.filled.is_empty() {
         return;

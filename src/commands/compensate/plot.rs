@@ -1,4 +1,4 @@
-//! The picture of the recorded and the compensated signal over time.
+//! Chart of the recorded and the compensated signal over time.
 
 use super::report::CompensateReport;
 use super::sink::Part;
@@ -7,7 +7,7 @@ use crate::chart::{Chart, Envelope, MarkedSpan, Series, SpanKind, picture};
 /// Height of the panel, in user units.
 const HEIGHT: f64 = 330.0;
 
-/// Both signals, gathered sample by sample in bounded memory.
+/// Both signals, collected sample by sample in bounded memory.
 #[derive(Debug, Clone)]
 pub struct Traces {
     range: Option<(f64, f64)>,
@@ -40,14 +40,14 @@ impl Traces {
         }
     }
 
-    /// Whether no sample lay within the range.
+    /// Whether no sample was within the range.
     pub fn is_empty(&self) -> bool {
         self.recorded.is_empty()
     }
 
-    /// Both signals, with what was filled in and the results that depend on it marked.
+    /// Both signals, with filled-in samples and the results that depend on them marked.
     pub(super) fn chart(&self, report: &CompensateReport) -> Chart {
-        // Seconds since 1970 would all have the same marks.
+        // Seconds since 1970 would give identical tick labels.
         let (zero_s, label) = match report.start.date() {
             None => (0.0, "time, s".to_owned()),
             Some(date) => (report.start.seconds(), format!("time after {date}, s")),

@@ -1,4 +1,4 @@
-//! The inverse of a stand with effects that no filter describes.
+//! Inverse of a stand with effects that no filter describes.
 
 use torqcomp_dsp::store::SampleStore;
 use torqcomp_model::effects::{Action, FoundLine, Unrecovered};
@@ -11,29 +11,29 @@ use crate::recording::{Spool, UniformRecord};
 use crate::stand::{ConstantStd, Stand};
 use crate::warning::Warning;
 
-/// Most samples of a record that is taken back as a whole: about 100 bytes of memory each are needed.
+/// Maximum number of samples of a record inverted as a whole, at about 100 bytes of memory each.
 const MOST_SAMPLES: usize = 1 << 24;
-/// Spans whose times a warning gives.
+/// Maximum number of spans whose times a warning gives.
 const SPANS_TOLD: usize = 5;
 /// Weight of the filter's taps, relative to all, beyond which a lost sample no longer matters.
 const REACH: f64 = 0.01;
-/// Share of a line's amplitude below which its phase is uncertain: by more than 0.2 rad.
+/// Fraction of a line's amplitude below which its phase is uncertain by more than 0.2 rad.
 const SURE: f64 = 0.98;
-/// Part of the record in which the direction of the motion is not known, from which it is worth a warning.
+/// Fraction of the record with unknown direction of motion from which a warning is given.
 const STUCK: f64 = 0.02;
 
 /// The scales of a record whose inverse is reported.
 struct Scales {
     start_s: f64,
     rate_hz: f64,
-    /// Time on both sides of a lost sample in which the result depends on it.
+    /// Time on both sides of a lost sample in which the result depends on its value.
     reach_s: f64,
     /// Printed units per SI unit of the record.
     printed: f64,
 }
 
-/// Takes a record back window by window and gives the torque and the recorded samples of each away; what was found on the
-/// way goes into the report.
+/// Inverts a record window by window and passes on the torque and the recorded samples of each; findings go into the
+/// report.
 pub(super) fn run(
     undo: &ChainInverse,
     (stand, constant): (&Stand, ConstantStd),
@@ -43,7 +43,7 @@ pub(super) fn run(
 ) -> Result<(), Failure> {
     let count = record.samples.count();
     check(record, undo)?;
-    // From the density in printed units to the deviation of a sample of the record in SI units.
+    // From the density in printed units to the standard deviation of a recorded sample in SI units.
     let noise_std = report.noise.record.as_ref().map_or(0.0, |noise| {
         let density = noise.floor_per_root_hz.powi(2);
         (0.5 * density * record.rate_hz).sqrt() * stand.gain() / report.scale
@@ -107,11 +107,11 @@ fn check(record: &UniformRecord<Spool>, undo: &ChainInverse) -> Result<(), Failu
     Ok(())
 }
 
-/// What noise makes of a result: from a second run with such noise added.
+/// Effect of noise on the result, from a second run with such noise added.
 struct AddedNoise {
     state: u64,
     carried: Option<Carried>,
-    /// Sum of the squared differences of the results.
+    /// Sum of squared differences of the results.
     square: f64,
 }
 
@@ -133,12 +133,12 @@ impl AddedNoise {
         (self.state >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Twelve uniform numbers have a variance of one together.
+    /// The sum of twelve uniform numbers has unit variance.
     fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 
-    /// Takes a window back with noise of that deviation added.
+    /// Inverts a window with added noise of the given standard deviation.
     fn add(
         &mut self,
         undo: &ChainInverse,
@@ -158,7 +158,7 @@ impl AddedNoise {
     }
 }
 
-/// Taps on either side of the middle, beyond which less than a small part of the weight is left.
+/// Number of taps on either side of the middle that contain all but a small part of the weight.
 pub(super) fn reach(taps: &[f64]) -> usize {
     let half = taps.len() / 2;
     let all: f64 = taps.iter().map(|tap| tap.abs()).sum();
@@ -172,7 +172,7 @@ pub(super) fn reach(taps: &[f64]) -> usize {
     0
 }
 
-/// What is done about each effect of a stand.
+/// Treatment of each effect of a stand.
 pub(super) fn effects(stand: &Stand, undo: Option<&ChainInverse>) -> Vec<UndoneEffect> {
     let Some(undo) = undo else {
         let divided = |declared: &crate::stand::DeclaredEffect| UndoneEffect {
@@ -193,7 +193,7 @@ pub(super) fn effects(stand: &Stand, undo: Option<&ChainInverse>) -> Vec<UndoneE
         .collect()
 }
 
-/// Adds what the inverse found to the report.
+/// Adds the findings of the inverse to the report.
 fn describe(report: &mut CompensateReport, undone: &InverseResult, scales: &Scales) {
     report.seen_to_hz = undone.seen_to_hz;
     report.lines = undone.lines.iter().map(|l| removed(l, scales)).collect();

@@ -17,7 +17,7 @@ use crate::recording::moment::Moment;
 use crate::stand::{ConstantStd, RecordedLevels};
 use crate::warning::Warning;
 
-/// Stretches whose times the text gives.
+/// Maximum number of stretches whose times the text gives.
 const LISTED: usize = 20;
 
 /// Report of a compensation.
@@ -193,7 +193,7 @@ impl Report for CompensateReport {
 }
 
 impl CompensateReport {
-    /// The figures that tables of many records give.
+    /// The figures for tables of many records.
     pub(super) fn figures(&self) -> RecordFigures {
         let Statistics {
             rms,
@@ -216,7 +216,7 @@ impl CompensateReport {
         }
     }
 
-    /// What was done and what came of it: names with their values.
+    /// Processing and results: names with their values.
     pub(super) fn facts(&self) -> Vec<[String; 2]> {
         let fact = |label: &str, value: String| [label.to_owned(), value];
         let mut facts = vec![
@@ -267,7 +267,7 @@ impl CompensateReport {
         facts
     }
 
-    /// Adds the gaps that were bridged in resampling to what was filled in.
+    /// Adds the gaps bridged in resampling to the filled-in stretches.
     pub(super) fn note_bridged(&mut self) {
         let start_s = self.start.seconds();
         let gaps = self
@@ -307,7 +307,7 @@ impl CompensateReport {
         )
     }
 
-    /// How much was filled in, and how far that reaches.
+    /// Amount filled in, and its range of influence.
     pub(super) fn filled_summary(&self) -> String {
         let samples: usize = self.filled.iter().map(|span| span.samples).sum();
         format!(
@@ -318,11 +318,11 @@ impl CompensateReport {
         )
     }
 
-    /// A time of the record for people.
+    /// A time on the record's axis, for people.
     pub(super) fn time_text(&self, time_s: f64) -> String {
         match self.start.origin_ns {
             0 => format!("{} s", rounded(time_s, 12)),
-            // Seconds since 1970 are good to 0.24 µs in an f64.
+            // Seconds since 1970 have a resolution of 0.24 µs in an f64.
             _ => {
                 let after_s = ((time_s - self.start.seconds()) * 1e6).round() * 1e-6;
                 self.start.later(after_s).short()
@@ -343,7 +343,7 @@ impl CompensateReport {
         format!("{}: {}{more}", self.filled_summary(), each.join(", "))
     }
 
-    /// Standard uncertainty of the result that stand, calibration and zero bring.
+    /// Standard uncertainty of the result due to stand, calibration and zero.
     pub(super) fn uncertainty_text(&self) -> String {
         let text = self.of_stand_text();
         match self.zero_std {
@@ -387,7 +387,7 @@ impl CompensateReport {
         }
     }
 
-    /// The same of a result that no filter describes.
+    /// The same for effects that no filter describes.
     fn result_std_text(&self, found: &ResultStd) -> String {
         let unit = &self.unit;
         let over = match found.samples < self.samples {

@@ -1,4 +1,4 @@
-//! Where the result goes: rows of text, or one channel more in a copy of a file of messages.
+//! Destination of the result: rows of text, or an additional channel in a copy of a message file.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,7 +17,7 @@ use crate::io::{COMPENSATED, Input};
 use crate::recording::MessageOrigin;
 use crate::stand::{self, Calibration};
 
-/// An open result, with its picture and its page as far as they are wanted.
+/// An open result, with chart and page if requested.
 pub(super) struct Sink {
     target: Target,
     traces: Option<Traces>,
@@ -29,7 +29,7 @@ enum Target {
     Messages(Box<Messages>),
 }
 
-/// A copy of the input that gets the torque as well.
+/// A copy of the input with the torque added.
 struct Messages {
     writer: Writer<Output>,
     origin: MessageOrigin,
@@ -40,7 +40,7 @@ struct Messages {
 /// The next samples of a result.
 pub(super) struct Part<'a> {
     pub(super) rows: Rows<'a>,
-    /// The rows as text, if the result is text.
+    /// The rows as text, for a text result.
     pub(super) text: &'a [u8],
     /// Compensated, in SI units.
     pub(super) torque: &'a [f64],
@@ -49,7 +49,7 @@ pub(super) struct Part<'a> {
 }
 
 impl Sink {
-    /// Opens the result and writes what comes before the first sample.
+    /// Opens the result and writes everything before the first sample.
     ///
     /// # Errors
     /// If the output cannot be written, or its format does not fit the input.
@@ -75,7 +75,7 @@ impl Sink {
         })
     }
 
-    /// Whether rows are wanted as text.
+    /// Whether rows are needed as text.
     pub(super) fn is_text(&self) -> bool {
         matches!(self.target, Target::Text(_))
     }
@@ -101,7 +101,7 @@ impl Sink {
         }
     }
 
-    /// Writes what comes after the last sample; the output is whole then.
+    /// Writes everything after the last sample, which completes the output.
     pub(super) fn finish(
         self,
         args: &Compensate,
@@ -113,7 +113,7 @@ impl Sink {
         }
     }
 
-    /// Topic and field of the result, if it is one of messages.
+    /// Topic and field of the result, if it consists of messages.
     pub(super) fn signal(&self) -> Option<String> {
         match &self.target {
             Target::Text(_) => None,
@@ -171,7 +171,7 @@ fn heading(chain: &Calibration, with_recorded: bool) -> String {
     }
 }
 
-/// The format that is asked for, or that the name of the output says.
+/// The requested format, or that of the output's name.
 fn format(args: &Compensate) -> Format {
     let output = args.result.output.as_deref();
     let is_mcap = output
@@ -181,7 +181,7 @@ fn format(args: &Compensate) -> Format {
         .unwrap_or(if is_mcap { Format::Mcap } else { Format::Csv })
 }
 
-/// The origin of the input's messages, if the result can be a copy of them.
+/// The source of the input's messages, if the result can be a copy of them.
 fn origin(args: &Compensate, plan: &Plan) -> Result<MessageOrigin, Failure> {
     let Some(origin) = &plan.stream.origin else {
         return Err(Failure::usage(

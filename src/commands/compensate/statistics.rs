@@ -28,7 +28,7 @@ pub(super) struct Sums {
 
 impl Sums {
     pub(super) fn of(values: &[f64]) -> Self {
-        // Several independent sums, which a processor can add at the same time.
+        // Several independent sums, which a processor can add in parallel.
         const SIDE_BY_SIDE: usize = 8;
         let (groups, rest) = values.as_chunks::<SIDE_BY_SIDE>();
         let mut parts = [Self::NONE; SIDE_BY_SIDE];

@@ -1,4 +1,4 @@
-//! The streaming way: pieces of the file go through the stages on all cores, in bounded memory.
+//! Streaming: pieces of the file pass through the stages on all cores, in bounded memory.
 
 use std::collections::VecDeque;
 
@@ -22,19 +22,19 @@ use crate::quality::excerpt;
 use crate::recording::moment::Moment;
 use crate::recording::{Block, StampGrid, StreamValidator};
 
-/// Jobs under way beside those that the threads hold.
+/// Number of jobs in addition to one per thread.
 const SPARE_JOBS: usize = 2;
 
-/// Longest block of the noise estimate: longer ones may not fit into a piece.
+/// Maximum block length of the noise estimate: longer blocks may not fit into a piece.
 const LONGEST_NOISE_BLOCK: usize = 1 << 13;
 
-/// A piece of the record on its way.
+/// A piece of the record in process.
 #[derive(Default)]
 struct Job {
     block: Block,
-    /// Sample that did not convert, and why.
+    /// Sample that cannot be converted, and why.
     unconverted: Option<(usize, String)>,
-    /// Index of the first sample of the window's middle in the record.
+    /// Index in the record of the first sample of the window's middle.
     first: usize,
     window: Vec<f64>,
     torque: Vec<f64>,
@@ -43,7 +43,7 @@ struct Job {
     sums: Option<Sums>,
 }
 
-/// What each sample goes through, the same on every thread.
+/// Processing of each sample, the same on every thread.
 struct Steps<'a> {
     half_length: usize,
     noise_block: usize,
@@ -56,7 +56,7 @@ struct Steps<'a> {
     args: &'a Compensate,
 }
 
-/// What is gathered from the finished pieces, in order.
+/// Results collected from the finished pieces, in order.
 struct Gathered<'a> {
     sink: &'a mut Sink,
     power: PowerSum,
@@ -64,7 +64,7 @@ struct Gathered<'a> {
     /// The first samples as recorded: for the quality of the record, and for its noise where it is too short for a
     /// block of the estimate.
     first: Vec<f64>,
-    /// What is wrong with samples anywhere.
+    /// Faults of samples anywhere.
     faults: StreamedFaults,
 }
 
@@ -105,7 +105,7 @@ pub(super) fn run(
         faults: StreamedFaults::default(),
     };
     let mut joiner = Joiner::new(grid, rate_hz, half_length);
-    // Rows enough that a piece needs no more than the one after it.
+    // Enough rows that a piece needs only the one after it.
     let (mut blocks, row_plan, mut validator) = stream.into_parts(2 * half_length);
     let threads = args.work.thread_count();
     let stages = Stages {
@@ -158,7 +158,7 @@ impl Gathered<'_> {
         Ok(())
     }
 
-    /// Puts what was gathered into the report.
+    /// Adds the collected results to the report.
     fn tell(&self, steps: &Steps, filter: &InverseFilter, report: &mut CompensateReport) {
         report.scale = steps.scale;
         report.start = steps.start;
@@ -178,7 +178,7 @@ impl Gathered<'_> {
     }
 }
 
-/// Puts the pieces together into windows, in order.
+/// Joins the pieces to windows, in order.
 struct Joiner {
     windows: Windows,
     resampler: Option<Resampler>,
@@ -204,7 +204,7 @@ impl Joiner {
         }
     }
 
-    /// Takes the next piece, `None` at the end, and hands on those whose windows are complete.
+    /// Takes the next piece, `None` at the end, and passes on those with complete windows.
     fn join(
         &mut self,
         validator: &mut StreamValidator,
@@ -278,7 +278,7 @@ impl Steps<'_> {
             .get_or_insert_with(|| PowerSum::new(self.noise_block));
         power.clear();
         if self.noise_block == convolver.block_length() {
-            // The forward transforms are there anyway.
+            // The forward transforms are available anyway.
             convolver.convolve(&job.window, &mut job.torque, Some(power));
         } else {
             convolver.convolve(&job.window, &mut job.torque, None);

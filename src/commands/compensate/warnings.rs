@@ -1,4 +1,4 @@
-//! What should be known about a compensated record.
+//! Warnings about a compensated record.
 
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::quality::resonance::other_resonance;
@@ -14,16 +14,16 @@ use crate::quality::excerpt;
 use crate::stand::{Stand, off_rated};
 use crate::warning::Warning;
 
-/// Gain from which a record of unknown noise is worth a warning.
+/// Gain from which a record of unknown noise gets a warning.
 const LARGE_GAIN: f64 = 10.0;
-/// Rms above the band over that within it, from which it is worth a warning.
+/// Rms above the band over that within it, from which a warning is given.
 const ABOVE_BAND: f64 = 0.1;
-/// Rms of the result over that of the record, from which it is worth a warning.
+/// Rms of the result over that of the record, from which a warning is given.
 const AMPLIFIED: f64 = 10.0;
-/// Part of the result that may be noise before it is worth a warning.
+/// Noise fraction of the result from which a warning is given.
 const NOISY_FRACTION: f64 = 0.5;
 
-/// Adds the warnings to a report that is complete otherwise.
+/// Adds the warnings to an otherwise complete report.
 pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Traces>) {
     let mut more: Vec<Warning> = seen.summary.lost.iter().cloned().collect();
     more.extend(seen.summary.warnings.clone());
@@ -51,7 +51,7 @@ pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Tr
     report.warnings.extend(more);
 }
 
-/// A warning if the stand rings above half the sampling rate, and nothing before the recorder keeps that out.
+/// A warning if the stand rings above the Nyquist frequency, and nothing before the recorder filters that out.
 pub(super) fn of_ringing(stand: &Stand, rate_hz: f64) -> Option<Warning> {
     let limit_hz = 0.5 * rate_hz;
     let modes = stand.modes().ok()?;
@@ -77,7 +77,7 @@ pub(super) fn of_ringing(stand: &Stand, rate_hz: f64) -> Option<Warning> {
     })
 }
 
-/// A warning if the ends of a record are felt beyond those that the filter has.
+/// A warning if the ends of the record affect the result beyond the filter's own ends.
 pub(super) fn of_ends(undo: Option<&ChainInverse>, edge_s: f64) -> Option<Warning> {
     let effect = undo?.endless()?;
     Some(Warning::new(
@@ -173,7 +173,7 @@ fn of_length(report: &CompensateReport) -> Option<Warning> {
     })
 }
 
-/// A warning if the result is many times as large as the record.
+/// A warning if the result is many times larger than the record.
 fn of_amplification(noise: &RecordNoise, report: &CompensateReport) -> Option<Warning> {
     let (unit, rms) = (&report.unit, report.result.rms);
     let amplifies = report.noise.largest_gain > 1.0;
@@ -209,7 +209,7 @@ fn of_noise(noise: &RecordNoise, report: &CompensateReport) -> Vec<Warning> {
             ),
         ));
     }
-    // A chosen band ends where the expected error is least, which may be above where the noise is as large as the signal.
+    // A chosen band ends at the least expected error, possibly above the frequency where the noise equals the signal.
     let lost_from_hz = noise.lost_from_hz(band_hz);
     if let Some(from_hz) = lost_from_hz.filter(|hz| report.band.is_given() || *hz == 0.0) {
         let remedy = if from_hz > 0.0 {

@@ -1,4 +1,4 @@
-//! Records of free ringing, of the measured quantity alone.
+//! Free-decay records of the measured quantity alone.
 
 use std::ops::Range;
 use std::path::Path;
@@ -13,7 +13,7 @@ use crate::io::{ChannelChoice, Input};
 use crate::recording::AlignedChannels;
 use crate::warning::Warning;
 
-/// The decays in a record of the measured quantity alone, each from its largest swing on.
+/// The decays in a record of the measured quantity alone, each from its largest swing.
 pub fn decays(args: &Diagnose, file: &Path) -> Result<Vec<Pair>, Failure> {
     let choice = ChannelChoice::measured_alone(&args.measured, args.measured_unit.as_deref());
     let read = AlignedChannels::read(&Input::of(file), &[choice], &args.reading)?;
@@ -60,7 +60,7 @@ pub fn decays(args: &Diagnose, file: &Path) -> Result<Vec<Pair>, Failure> {
     Ok(pairs.collect())
 }
 
-/// Refuses arguments that do not go with records of free ringing.
+/// Rejects arguments that do not apply to free-decay records.
 pub fn check_arguments(args: &Diagnose) -> Result<(), Failure> {
     if args.training_files().is_empty() {
         return Err(Failure::usage(
@@ -88,7 +88,7 @@ pub fn check_arguments(args: &Diagnose) -> Result<(), Failure> {
     }
 }
 
-/// The last decay, taken out of the training records, which must have another one.
+/// The last decay, removed from the training records, which must contain another one.
 pub fn last(train: &mut Vec<Pair>) -> Result<Option<Pair>, Failure> {
     if let [only] = train.as_slice() {
         return Err(Failure::failed(
@@ -101,7 +101,7 @@ pub fn last(train: &mut Vec<Pair>) -> Result<Option<Pair>, Failure> {
     Ok(train.pop())
 }
 
-/// A stand file of free ringing alone would lack the gain that its effects need.
+/// A stand file from free decays alone would lack the gain that its effects need.
 pub fn no_gain() -> Failure {
     Failure::usage(
         ErrorCode::MissingArgument,

@@ -1,4 +1,4 @@
-//! What the stand file of a diagnosis declares.
+//! Declarations of the stand file of a diagnosis.
 
 use std::sync::Arc;
 
@@ -30,12 +30,12 @@ pub(super) fn several(stand: &Stand) -> Result<Option<SeveralModes>, Failure> {
     Ok(SeveralModes::of(&stand.modes()?, has_shapes))
 }
 
-/// What is recorded of the stand's motion.
+/// Recorded quantity of the stand's motion.
 pub(super) fn measures(stand: &Stand) -> Result<Motion, Failure> {
     Ok(stand.mechanics()?.measures)
 }
 
-/// Says that no torques in the stand are looked for where their effect on the record is not known.
+/// Reports that torques in the stand are not searched for if their effect on the record is unknown.
 pub(super) fn torques_unknown(
     several: Option<&SeveralModes>,
     measures: Motion,
@@ -84,7 +84,7 @@ pub(super) fn declared_effects(stand: Option<&Stand>) -> Vec<DeclaredForm> {
     effects.iter().map(form).collect()
 }
 
-/// The recorder as far as the stand file declares it.
+/// The recorder as far as declared in the stand file.
 pub(super) fn recorder(stand: &Stand) -> Option<Fixed> {
     let recorder = stand.recorder.recorder.clone();
     let is_ideal = recorder.is_ideal();

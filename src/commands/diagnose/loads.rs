@@ -1,4 +1,4 @@
-//! Known loads of a diagnosis, put on slowly.
+//! Slowly applied known loads of a diagnosis.
 
 use std::path::Path;
 
@@ -22,7 +22,7 @@ pub(super) fn pairs(args: &Diagnose) -> Result<Vec<Pair>, Failure> {
 fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
     let needs = "--static needs --applied COL, the channel with the known loads";
     let choices = two_columns(args, needs)?;
-    // When a load was put on does not matter, so no time axis is searched for, whatever is said of that of the records.
+    // The times of the loads do not matter, so no time axis is searched for, whatever options the records have.
     let reading = Reading {
         rate_hz: Some(1.0),
         time_column: None,
@@ -60,7 +60,7 @@ fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
     })
 }
 
-/// Refuses loads or readings that are not of the kind of the records; units of one kind may differ.
+/// Rejects loads or readings of another kind than the records; units of one kind may differ.
 pub(super) fn check_units(loads: &[Pair], record: &Pair) -> Result<(), Failure> {
     let kind = |unit: &Option<NamedUnit>| unit.as_ref().map(|named| named.unit.dimension());
     let differs = |load: &&Pair| {

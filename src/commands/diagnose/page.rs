@@ -1,4 +1,4 @@
-//! A diagnosis as a page for a browser: records beside both models, residuals, candidates, what remains.
+//! HTML report of a diagnosis: records and both models, residuals, candidates, remaining error.
 
 use std::path::Path;
 
@@ -15,14 +15,14 @@ use crate::print::{plural, rounded, short, unit_or_as_recorded};
 use crate::provenance::Provenance;
 use crate::stand::si_unit;
 
-/// Periods of the stand in the picture over time.
+/// Number of periods of the stand in the chart over time.
 const PERIODS: f64 = 24.0;
-/// Fewest and most samples in that picture.
+/// Minimum and maximum number of samples in that chart.
 const PICTURED: [usize; 2] = [50, 4000];
-/// Lags of the autocorrelation that is drawn.
+/// Number of lags of the autocorrelation drawn.
 const LAGS: usize = 60;
 
-/// A page for a browser, complete in itself.
+/// A self-contained HTML page.
 pub fn page(diagnosis: &Diagnosis, provenance: &Provenance) -> String {
     let stand = diagnosis.sources.stand.as_deref();
     let stand = stand.map_or_else(|| "a plain stand".to_owned(), file_name);
@@ -119,7 +119,7 @@ impl Draft<'_> {
         self.page.table(&constant_rows(self.diagnosis));
     }
 
-    /// The models that are drawn, with their residuals on the held-out records: without an accepted effect, after is before.
+    /// The models drawn, with their residuals on the hold-out records; without an accepted effect, only that before.
     fn models(&self) -> Vec<(&'static str, &[RecordResidual])> {
         let mut models = vec![("before", &self.diagnosis.before.compared[..])];
         if !self.diagnosis.effects.is_empty() {
@@ -209,12 +209,12 @@ impl Draft<'_> {
         }
     }
 
-    /// The label of an axis of such a quantity.
+    /// Axis label of such a quantity.
     fn label(&self, quantity: &str) -> String {
         format!("{quantity}, {}", unit_or_as_recorded(self.unit))
     }
 
-    /// A chart with a series for each model, in the colours that they have beside the measured record.
+    /// A chart with a series for each model, in the same colours as with the measured record.
     fn of_residuals(
         &self,
         title: &str,
@@ -229,7 +229,7 @@ impl Draft<'_> {
         }
     }
 
-    /// Density of white noise that has the power of the noise floor.
+    /// Density of white noise with the power of the noise floor.
     fn noise_floor(&self) -> Option<Series> {
         let rms = self.diagnosis.error.noise_floor_rms?;
         let holdout = &self.diagnosis.before.compared;
@@ -365,7 +365,7 @@ impl Draft<'_> {
 }
 
 impl Draft<'_> {
-    /// The torque that is missing, whatever its law, over displacement and over speed.
+    /// The missing torque, regardless of its law, over displacement and over speed.
     fn surface(&mut self) {
         let Some(surface) = &self.diagnosis.force_surface else {
             return;
@@ -414,7 +414,7 @@ fn logarithmic(chart: Chart) -> Chart {
     }
 }
 
-/// The last part of a path.
+/// The last component of a path.
 fn file_name(path: &str) -> String {
     let name = Path::new(path).file_name();
     name.map_or_else(|| path.to_owned(), |n| n.to_string_lossy().into_owned())

@@ -27,16 +27,16 @@ use crate::warning::Warning;
 pub(super) const FEWEST: usize = 200;
 /// Steps of integration before the natural frequency is known.
 const FIRST_STEPS: usize = 2;
-/// Samples at the start that do not count until the natural frequency is known.
+/// Samples at the start excluded until the natural frequency is known.
 const EXCLUDED: usize = 32;
-/// Most of a decay that does not count at its start, as one in so many samples: there the hit may not be over.
+/// Inverse of the maximum fraction excluded at the start of a decay, where the hit may not be over.
 const PART_OF_DECAY: usize = 50;
 
 const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
 
 pub(super) struct Pair {
     pub(super) source: String,
-    /// Nothing acts on a stand that rings freely.
+    /// `None` for a free decay.
     pub(super) applied: Option<Vec<f64>>,
     pub(super) measured: Vec<f64>,
     pub(super) rate_hz: f64,
@@ -48,7 +48,7 @@ pub(super) struct Pair {
 }
 
 impl Pair {
-    /// The measured channel as a stand takes it.
+    /// The measured channel in the form required by a stand.
     fn measured_channel(&self) -> RecordedChannel<'_> {
         RecordedChannel {
             name: "measured",
@@ -64,7 +64,7 @@ impl Pair {
             return Ok(self.measured.iter().map(|y| y * factor).collect());
         };
         let calibration = stand.calibration(self.measured_channel(), UnitSystem::Si)?;
-        // The constant of the records is estimated anew, as in records of torque.
+        // The offset of the records is estimated anew, as in records of torque.
         let chain = Calibration {
             zero: 0.0,
             ..calibration
@@ -79,18 +79,18 @@ impl Pair {
     }
 }
 
-/// What was read.
+/// Input data.
 pub struct ReadCase {
     pub case: Case,
-    /// Loads that no effect is fitted to.
+    /// Loads not used for fitting effects.
     pub loads: Vec<KnownLoads>,
-    /// The static gain, as far as stand file or units give it, in SI units.
+    /// Static gain in SI units, as far as given by stand file or units.
     pub declared_gain: Option<Estimate>,
-    /// Whether something of a record was lost.
+    /// Whether part of a record was lost.
     pub is_lossy: bool,
 }
 
-/// Reads all records, and what the stand file declares of them.
+/// Reads all records, and the declarations of the stand file about them.
 pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<ReadCase, Failure> {
     let [train, holdout, loads] = all_pairs(args)?;
     let last_is_held_out = args.train.is_empty() && args.held_out_files().is_empty();
@@ -137,7 +137,7 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<ReadCase, Failure>
         declared,
         several,
         declared_effects: declared_effects(stand),
-        // Free ringing does not show the gain.
+        // The gain is not identifiable from free decays.
         gain_is_declared: gain.is_some() && static_gain(stand).is_none() || args.train.is_empty(),
         measures,
         sees_torques,
@@ -153,12 +153,12 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<ReadCase, Failure>
     })
 }
 
-/// The training and the held-out records, and the known loads, all of one kind.
+/// The training and hold-out records and the known loads, all of one kind.
 fn all_pairs(args: &Diagnose) -> Result<[Vec<Pair>; 3], Failure> {
     let (mut train, mut holdout) = pairs(args)?;
     let loads = loads::pairs(args)?;
     if let (Some(load), true) = (loads.first(), args.train.is_empty()) {
-        // They say in what the gain is counted.
+        // They determine the unit of the gain.
         for pair in train.iter_mut().chain(&mut holdout) {
             pair.applied_unit.clone_from(&load.applied_unit);
         }
@@ -172,8 +172,8 @@ fn all_pairs(args: &Diagnose) -> Result<[Vec<Pair>; 3], Failure> {
     Ok([train, holdout, loads])
 }
 
-/// Holds out the ends of the training records where no record is held out; says what is held out in place of a record that was
-/// given for it.
+/// Holds out the ends of the training records if there is no hold-out record; reports what is held out in place of a
+/// given hold-out record.
 fn held_out_instead(records: &mut Records, last_is_held_out: bool) -> Option<Warning> {
     let instead = match (last_is_held_out, records.holdout.is_empty()) {
         (true, _) => "the last decay is",
@@ -189,7 +189,7 @@ fn held_out_instead(records: &mut Records, last_is_held_out: bool) -> Option<War
     ))
 }
 
-/// The training and the held-out records.
+/// The training and hold-out records.
 fn pairs(args: &Diagnose) -> Result<(Vec<Pair>, Vec<Pair>), Failure> {
     let all = |files: &[PathBuf], of_decays: &[PathBuf]| -> Result<Vec<Pair>, Failure> {
         let mut all = Vec::new();
@@ -209,7 +209,7 @@ fn pairs(args: &Diagnose) -> Result<(Vec<Pair>, Vec<Pair>), Failure> {
     Ok((train, holdout))
 }
 
-/// The columns of applied and measured quantity; `without` is what is said where the first is not named.
+/// The columns of applied and measured quantity; `without`: message if the first is not named.
 pub(super) fn two_columns(args: &Diagnose, without: &str) -> Result<[ChannelChoice; 2], Failure> {
     let applied = args.applied.as_deref();
     let applied = applied.ok_or_else(|| Failure::usage(ErrorCode::MissingArgument, without))?;
@@ -262,7 +262,7 @@ fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
     })
 }
 
-/// Refuses records at different rates or in different units.
+/// Rejects records at different rates or in different units.
 fn check_same_kind(first: &Pair, other: &Pair) -> Result<(), Failure> {
     if (first.rate_hz / other.rate_hz - 1.0).abs() > 1e-4 {
         return Err(Failure::failed(
@@ -295,7 +295,7 @@ fn check_same_kind(first: &Pair, other: &Pair) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses a held-out record that is fitted as well.
+/// Rejects a hold-out record that is also a training record.
 fn refuse_same_samples(train: &[Pair], holdout: &[Pair]) -> Result<(), Failure> {
     let is_same = |a: &Pair, b: &Pair| a.measured == b.measured && a.applied == b.applied;
     let mut pairs = holdout
@@ -319,19 +319,19 @@ fn refuse_same_samples(train: &[Pair], holdout: &[Pair]) -> Result<(), Failure> 
     }
 }
 
-/// The static gain that a stand file gives in place of constants in units of torque.
+/// The static gain given by a stand file in place of constants in units of torque.
 fn static_gain(stand: Option<&Stand>) -> Option<f64> {
     stand?.static_gain().map(|gain| gain.value)
 }
 
-/// Units of the channels, and whether the stand's calibration converts the measured one to torque; `acts` is whether there is
-/// an applied quantity, or known loads.
+/// Units of the channels, and whether the stand's calibration converts the measured one to torque; `acts`: whether
+/// there is an applied quantity or known loads.
 fn units(pair: &Pair, stand: Option<&Stand>, acts: bool) -> (ChannelUnits, bool) {
     let channels = [&pair.applied_unit, &pair.measured_unit];
     let [applied_text, measured_text] =
         channels.map(|unit| unit.as_ref().map_or_else(String::new, |u| u.text.clone()));
     let [applied, measured] = channels.map(|unit| unit.as_ref().map(|u| u.unit.dimension()));
-    // What does not act has any unit.
+    // Without an applied quantity, its unit is arbitrary.
     let applied = if acts { applied } else { Some(TORQUE) };
     let factors = channels.map(|unit| unit.as_ref().map_or(1.0, |u| u.unit.factor()));
     let is_torque_stand = static_gain(stand).is_none();
@@ -370,14 +370,14 @@ fn units(pair: &Pair, stand: Option<&Stand>, acts: bool) -> (ChannelUnits, bool)
     (units, is_calibrated)
 }
 
-/// A declared gain with the standard uncertainty that the stand file gives it.
+/// A declared gain with its standard uncertainty from the stand file.
 fn with_declared_std(gain: f64, stand: Option<&Stand>) -> Estimate {
     let given = stand.and_then(Stand::static_gain);
     let relative = given.and_then(|given| given.relative_std);
     Estimate::of("", gain, relative.map(|std| std * gain.abs()))
 }
 
-/// The static gain as far as it is declared: 1 from torque to torque.
+/// The static gain as far as declared: 1 from torque to torque.
 fn declared_gain(stand: Option<&Stand>, units: &ChannelUnits) -> Option<f64> {
     static_gain(stand).or(units.is_torque.then_some(1.0))
 }

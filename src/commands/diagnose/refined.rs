@@ -1,4 +1,4 @@
-//! From a diagnosis to the refined stand file.
+//! The refined stand file of a diagnosis.
 
 use torqcomp_model::Estimate;
 use torqcomp_model::effects::Unit;
@@ -14,7 +14,7 @@ use crate::stand::{self, Refined, Stand};
 /// The refined stand file.
 ///
 /// # Errors
-/// If the declared one cannot be read again.
+/// If the declared stand file cannot be read again.
 pub fn stand_file(
     diagnosis: &Diagnosis,
     declared: Option<(&Stand, &str)>,
@@ -39,7 +39,7 @@ pub fn stand_file(
     let both = |estimate: Estimate| (estimate.value(), estimate.std_uncertainty());
     let units = held.map_or(&context.units, |held| &held.recorded);
     let constant = |of: fn(&RecordResidual) -> f64| match held {
-        // Where a free body began says nothing of another record.
+        // The initial position of a free body does not apply to other records.
         Some(_) => 0.0,
         None => mean(&model.train, of),
     };
@@ -68,7 +68,7 @@ pub fn stand_file(
     stand::refine(declared, &refined)
 }
 
-/// The files that the numbers come from.
+/// The source files of the numbers.
 fn fitted_files(diagnosis: &Diagnosis) -> Vec<&str> {
     let loads = diagnosis.known_loads.iter().flat_map(|loads| &loads.files);
     let train = diagnosis.sources.train.iter().map(String::as_str);
@@ -77,7 +77,7 @@ fn fitted_files(diagnosis: &Diagnosis) -> Vec<&str> {
         .collect()
 }
 
-/// What was fitted of each mode of a stand with several: shapes stay as they are.
+/// Fitted parameters of each mode of a stand with several; mode shapes are unchanged.
 fn modes(model: &ScoredModel) -> Vec<Vec<(&'static str, Estimate)>> {
     let several = &model.fitted.structure.context.several;
     let has_shapes = several.as_ref().is_some_and(|several| several.has_shapes);
@@ -93,7 +93,7 @@ fn modes(model: &ScoredModel) -> Vec<Vec<(&'static str, Estimate)>> {
     model.modes().into_iter().map(of_mode).collect()
 }
 
-/// The parameters of an effect on a free body beside the weak spring of its stand file.
+/// The parameters of an effect on a free body with the weak spring of its stand file.
 fn weakly_held(
     held: &HeldBody,
     effect: &EffectForm,
@@ -117,7 +117,7 @@ fn weakly_held(
     converted.collect()
 }
 
-/// A parameter as it is written: its name, and the texts of its value and of its standard uncertainty.
+/// A parameter as written: its name, and the texts of its value and standard uncertainty.
 fn written(parameter: &EffectParameter) -> (&'static str, String, Option<String>) {
     let estimate = &parameter.estimate;
     let text = |number: f64, digits: u32| {
@@ -132,7 +132,7 @@ fn written(parameter: &EffectParameter) -> (&'static str, String, Option<String>
     )
 }
 
-/// Mean over the training records of something that belongs to a record.
+/// Mean of a property of the training records.
 fn mean(residuals: &[RecordResidual], of: impl Fn(&RecordResidual) -> f64) -> f64 {
     residuals.iter().map(of).sum::<f64>() / residuals.len() as f64
 }

@@ -11,7 +11,7 @@ use crate::print::{
     Report, columns, enumeration, plural, relative, rounded, unit_or_as_recorded, with_std,
 };
 
-/// Candidates that are listed unless all are asked for.
+/// Number of candidates listed by default.
 const FIRST: usize = 5;
 
 impl Report for Diagnosis {
@@ -63,7 +63,7 @@ impl Report for Diagnosis {
     }
 }
 
-/// What was found and what to do about it: the verdict, each effect with its equation, the next record.
+/// Findings and remedy: the verdict, each effect with its equation, the next record.
 pub fn answer(diagnosis: &Diagnosis) -> Vec<String> {
     let names = enumeration(&diagnosis.effects, "and");
     let reduce = match diagnosis.effects.len() {
@@ -103,7 +103,7 @@ pub fn answer(diagnosis: &Diagnosis) -> Vec<String> {
     all.chain(change).chain(surface).chain(next).collect()
 }
 
-/// The moment at which the stand changed.
+/// The time at which the stand changed.
 fn of_change(change: &ChangedStand) -> String {
     let constants = change.constants.iter().filter(|c| c.is_significant());
     let constants: Vec<String> = constants
@@ -130,7 +130,7 @@ fn of_change(change: &ChangedStand) -> String {
     )
 }
 
-/// What a surface over the motion says.
+/// Text about a surface over the motion.
 fn of_surface(surface: &ForceSurface, unit: &str) -> Vec<String> {
     let place = match surface.place {
         SurfacePlace::Stand => "a torque in the stand",
@@ -167,7 +167,7 @@ fn explained(effect: &Effect, law: &str) -> String {
     )
 }
 
-/// The candidates that are listed first, the accepted ones among them, and the others.
+/// The candidates listed first, including the accepted ones, and the others.
 pub fn candidates(diagnosis: &Diagnosis) -> (Vec<&CandidateFit>, Vec<&CandidateFit>) {
     let (mut all, others): (Vec<_>, Vec<_>) = diagnosis
         .candidates
@@ -194,7 +194,7 @@ pub fn suspected(guard: &GuardModel) -> String {
     )
 }
 
-/// The error with ever more effects and what each explains, where there are several.
+/// The error with an increasing number of effects, and the contribution of each, if there are several.
 fn several(diagnosis: &Diagnosis) -> String {
     if diagnosis.effects.len() < 2 {
         return String::new();
@@ -210,7 +210,7 @@ fn several(diagnosis: &Diagnosis) -> String {
     text + "\n"
 }
 
-/// The held-out error with ever more effects, with a head.
+/// The hold-out error with an increasing number of effects, with a heading.
 pub fn ladder_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     let head = format!("rms error, {}", unit_or_as_recorded(&diagnosis.error.unit));
     let mut rows = vec![cells([&head, "training", "held out"])];
@@ -225,7 +225,7 @@ pub fn ladder_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     rows
 }
 
-/// What each effect explains, with a head.
+/// The contribution of each effect, with a heading.
 pub fn share_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     let mut rows = vec![cells(["effect", "share of the explained power"])];
     let shares = diagnosis.explained.shares.iter();
@@ -244,7 +244,7 @@ pub fn estimate(value: f64, std: Option<f64>) -> String {
     }
 }
 
-/// The three errors, with a head.
+/// The three errors, with a heading.
 pub fn error_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     let error = &diagnosis.error;
     let head = format!("rms error, {}", unit_or_as_recorded(&error.unit));
@@ -266,7 +266,7 @@ pub fn error_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     rows
 }
 
-/// A change of the error with one decimal; a large one as a factor.
+/// A change of the error with one decimal, or as a factor if large.
 fn change(part: f64) -> String {
     match part.abs() < 10.0 {
         true => format!("{:.1} %", 100.0 * part),
@@ -274,7 +274,7 @@ fn change(part: f64) -> String {
     }
 }
 
-/// The improvement and the noise floor, a sentence each.
+/// The improvement and the noise floor, one sentence each.
 pub fn error_sentences(diagnosis: &Diagnosis) -> Vec<String> {
     let error = &diagnosis.error;
     let unit = unit_or_as_recorded(&error.unit);
@@ -308,7 +308,7 @@ pub fn error_sentences(diagnosis: &Diagnosis) -> Vec<String> {
     all.collect()
 }
 
-/// What known loads say, a sentence each.
+/// Results from known loads, one sentence each.
 pub fn load_sentences(diagnosis: &Diagnosis) -> Vec<String> {
     let Some(loads) = &diagnosis.known_loads else {
         return Vec::new();
@@ -336,11 +336,11 @@ pub fn load_sentences(diagnosis: &Diagnosis) -> Vec<String> {
     std::iter::once(gain).chain(files).collect()
 }
 
-/// What the detection limits are.
+/// Explanation of the detection limits.
 pub const WOULD_SHOW: &str =
     "Smallest amounts detectable in the training records with 95 % certainty";
 
-/// The detection limits, with a head.
+/// The detection limits, with a heading.
 pub fn limit_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     let mut rows = vec![cells(["effect", "detectable from", "at"])];
     rows.extend(diagnosis.detection_limits.iter().map(|limit| {
@@ -369,7 +369,7 @@ pub fn limit_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     rows
 }
 
-/// The constants of the plain stand, with a head.
+/// The constants of the plain stand, with a heading.
 pub fn constant_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     let mut rows = vec![cells(["constant", "declared", "before", "after"])];
     rows.extend(diagnosis.constants.iter().map(|c| {

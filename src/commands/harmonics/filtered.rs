@@ -1,4 +1,4 @@
-//! Where a compensated record ends: what lies above its band was filtered out of it.
+//! End of the band of a compensated record; everything above it was filtered out.
 
 use torqcomp_dsp::quality::median;
 use torqcomp_dsp::spectrum::{Density, welch_steep};
@@ -9,22 +9,22 @@ use crate::print::{rounded, short};
 use crate::recording::{Spool, UniformRecord};
 use crate::warning::Warning;
 
-/// Most samples that are looked at, in one block: an edge between two lines is narrow.
+/// Maximum number of samples evaluated, in one block: an edge between two lines is narrow.
 const MOST: usize = 1 << 16;
-/// Fewest bins of a part of the spectrum that is compared.
+/// Minimum number of bins of a compared part of the spectrum.
 const BINS: usize = 5;
-/// The end of a band over its top: the edge between them is a fifth of the band wide.
+/// End of a band over its top: the edge between them is a fifth of the band wide.
 const EDGE: f64 = 1.2;
-/// Ratio of the frequencies that are tried.
+/// Ratio of successive trial frequencies.
 const STEP: f64 = 1.005;
-/// Density behind the end over that before the edge: no recorder's low-pass falls so far within one edge.
+/// Density above the end over that below the edge: no recorder's low-pass falls so far within one edge.
 const FALL: f64 = 1e-4;
-/// Where the edge has fallen so far, over the top: the gain is `√FALL` at 0.72 of the edge's width (`torqcomp_dsp::Band::gain`).
+/// Frequency of this fall, over the top: the gain is `√FALL` at 0.72 of the edge's width (`torqcomp_dsp::Band::gain`).
 const FALLEN: f64 = 1.144;
-/// Frequencies over the top that was found up to which an order counts as within the band: the edge takes 1 % at 1.056.
+/// Frequency over the detected top up to which an order counts as within the band: the edge reduces it by 1 % at 1.056.
 const NEAR: f64 = 1.05;
 
-/// A warning if orders lie where the spectrum of the record has been cut off.
+/// A warning if orders lie where the spectrum of the record is cut off.
 pub(super) fn warning(
     record: &UniformRecord<Spool>,
     fundamental_hz: f64,
@@ -53,13 +53,13 @@ pub(super) fn warning(
     })
 }
 
-/// The top of the band, if the spectrum ends somewhere as if cut off, and all above is gone.
+/// The top of the band, if the spectrum is cut off somewhere with nothing above.
 fn top(density: &Density, nyquist_hz: f64) -> Option<f64> {
     let level = |from_hz: f64, to_hz: f64| {
         let mut values: Vec<f64> = density.between(from_hz, to_hz).map(|(_, v)| v).collect();
         median(&mut values).filter(|_| values.len() >= BINS)
     };
-    // The largest density of each bin and all above.
+    // Maximum density of each bin and all above.
     let mut largest = density.values.clone();
     for bin in (1..largest.len()).rev() {
         largest[bin - 1] = largest[bin - 1].max(largest[bin]);

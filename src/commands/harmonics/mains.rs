@@ -1,16 +1,16 @@
-//! Orders that cannot be told from lines of the mains.
+//! Orders indistinguishable from mains lines.
 
 use super::{ComponentTorque, named};
 use crate::print::short;
 use crate::warning::Warning;
 
-/// Orders of the mains that are looked at.
+/// Mains orders checked.
 const MAINS_LINES: f64 = 5.0;
-/// Frequencies of the mains.
+/// Mains frequencies.
 const GRIDS_HZ: [f64; 2] = [50.0, 60.0];
 
-/// Orders that lie where lines of the mains lie: one record cannot tell them apart. Of a fundamental that is the mains' own it is
-/// said once.
+/// Orders at the frequencies of mains lines, indistinguishable in one record. If the fundamental is that of the mains,
+/// one warning is given.
 pub(super) fn warning(components: &[ComponentTorque], duration_s: f64) -> Option<Warning> {
     let fundamental_hz = components.first().map(|c| c.frequency_hz / c.order)?;
     let of_grid = |grid_hz: &f64| (fundamental_hz - grid_hz).abs() < 1.0 / duration_s;

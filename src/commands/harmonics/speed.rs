@@ -1,4 +1,4 @@
-//! Whether the speed is the one given and stays it, without which a fit of fixed frequencies is wrong.
+//! Checks that the speed is constant and as given; otherwise a fit of fixed frequencies is wrong.
 
 use torqcomp_dsp::harmonics::{Component, Fundamental, Harmonics, fit, refine_fundamental};
 use torqcomp_dsp::store::SampleStore;
@@ -8,34 +8,34 @@ use crate::print::rounded;
 use crate::recording::{Spool, UniformRecord};
 use crate::warning::Warning;
 
-/// Parts of the record whose speeds are compared.
+/// Number of parts of the record whose speeds are compared.
 const PARTS: usize = 4;
-/// Most samples that are looked at in a part.
+/// Maximum number of samples evaluated in a part.
 const MOST: usize = 1 << 15;
-/// Fewest periods of the fundamental in a part.
+/// Minimum number of periods of the fundamental in a part.
 const FEWEST: f64 = 8.0;
-/// How far from the fundamental it is looked for, relative to it, and where it is not there.
+/// Relative search ranges around the fundamental; the wider ones apply if it is not found.
 const SPAN: f64 = 0.05;
 const FAR_SPAN: f64 = 0.15;
 const WIDE_SPAN: f64 = 0.3;
-/// Difference of two speeds, in their standard uncertainties, that is none by chance.
+/// Significant difference of two speeds, in their standard uncertainties.
 const SIGNIFICANT: f64 = 5.0;
-/// Turns that the highest order gains or loses over the record by a difference of speed that is worth saying.
+/// Cycles gained or lost by the highest order over the record, from which a difference of speed is reported.
 const TURNS: f64 = 0.2;
 
-/// Most samples from which the speed is found.
+/// Maximum number of samples for estimating the speed.
 const FIRST: usize = 1 << 17;
-/// Energy that a wrong speed loses, over the power of what the right one leaves in a sample, that is none by chance.
+/// Significant energy lost by a wrong speed, over the residual power per sample at the right one.
 const LOST: f64 = 50.0;
-/// The same over the power of the components, where the load changes.
+/// The same over the power of the components, if the load changes.
 const LOST_OF_POWER: f64 = 0.05;
-/// Change of a component by another speed, over the component, that is worth saying.
+/// Relative change of a component due to another speed, from which it is reported.
 const CHANGED: f64 = 0.02;
-/// Amplitude over its uncertainty from which a component is surely there.
+/// Amplitude over its uncertainty from which a component is significant.
 const THERE: f64 = 10.0;
 
-/// A warning if another fundamental near the given one leaves much less of the record over: the speed on the nameplate is
-/// not that of the record, and its components come out too small.
+/// A warning if another fundamental near the given one gives a much smaller residual: the speed on the nameplate is
+/// not that of the record, and the fitted components are too small.
 pub(super) fn off(
     record: &UniformRecord<Spool>,
     fundamental_hz: f64,
@@ -70,7 +70,7 @@ pub(super) fn off(
         let is_off = is_there && matters && shift_hz > SIGNIFICANT * found.std_hz?;
         is_off.then_some((found, shift_hz, span))
     };
-    // A speed that is there is not looked for farther away.
+    // A speed found nearby is not searched for farther away.
     let is_there = given.components.iter().any(is_sure);
     let far = || within(FAR_SPAN).filter(|_| !is_there);
     let found = within(SPAN).or_else(far);
@@ -91,9 +91,9 @@ pub(super) fn off(
     })
 }
 
-/// A warning if the fundamental differs between the parts of a record by more than its uncertainty there, and by so much
-/// that the highest order loses its phase. It is found from differences over a quarter of the shortest period, in which a
-/// load step is a short pulse.
+/// A warning if the fundamental differs between parts of the record by more than its uncertainty, and by so much
+/// that the highest order loses its phase. It is estimated from differences over a quarter of the shortest period,
+/// where a load step is a short pulse.
 pub(super) fn warning(
     record: &UniformRecord<Spool>,
     fundamental_hz: f64,
@@ -112,7 +112,7 @@ pub(super) fn warning(
         let samples = record.samples.part(start..start + length).ok()?;
         let pairs = samples.iter().zip(&samples[lag..]);
         let changes: Vec<f64> = pairs.map(|(before, after)| after - before).collect();
-        // The span ends where the highest order leaves the spectrum.
+        // The range ends where the highest order exceeds the spectrum.
         let fundamental_hz = fundamental_hz.min(0.5 * record.rate_hz / highest / (1.0 + span));
         refine_fundamental(&changes, record.rate_hz, fundamental_hz, span, orders).ok()
     };
@@ -120,7 +120,7 @@ pub(super) fn warning(
         let parts = 0..PARTS;
         parts.map(|place| part(place, span, length)).collect()
     };
-    // A speed that is not there may change so fast that a line is one over a few periods only.
+    // A speed that is not found may change so fast that a line exists over a few periods only.
     let few = (FEWEST * record.rate_hz / fundamental_hz) as usize;
     let found = with(SPAN, length).or_else(|| with(WIDE_SPAN, few))?;
     let by_speed = |a: &&Fundamental, b: &&Fundamental| a.frequency_hz.total_cmp(&b.frequency_hz);
@@ -145,16 +145,17 @@ pub(super) fn warning(
     })
 }
 
-/// Most windows in which the angle of the shaft is looked at, and fewest.
+/// Maximum and minimum number of windows for the angle of the shaft.
 const MOST_WINDOWS: usize = 128;
 const FEWEST_WINDOWS: usize = 8;
-/// Variance of the angle over that by noise from which on the shaft sways.
+/// Variance of the angle over that due to noise, from which the speed fluctuates.
 const SWAYS: f64 = 4.0;
-/// Angle in rad, rms, by which the highest order that is there sways before it is worth saying: it then comes out 2 % too small.
+/// Reported phase fluctuation of the highest significant order, rms in rad: its amplitude is then 2 % too small.
 const SWAY_RAD: f64 = 0.2;
 
-/// A warning if the angle of the shaft sways about that of a steady rotation: the speed is right on average, and the higher orders
-/// are smeared out. The angle is what the phases of the orders have in common, each divided by its order, from window to window.
+/// A warning if the angle of the shaft fluctuates about that of a steady rotation: the speed is right on average, but
+/// the higher orders are smeared. The angle is the common part of the phases of the orders, each divided by its order,
+/// per window.
 pub(super) fn sways(
     record: &UniformRecord<Spool>,
     fundamental_hz: f64,
@@ -207,7 +208,7 @@ pub(super) fn sways(
     })
 }
 
-/// Whether a component is there without doubt.
+/// Whether a component is significant.
 fn is_sure(component: &Component) -> bool {
     component.phasor.norm() > THERE * component.std_amplitude
 }
@@ -229,14 +230,14 @@ fn without_line(values: &[[f64; 2]]) -> f64 {
     left.sum::<f64>() / (count - 2.0)
 }
 
-/// Pieces of the record whose mean torques are compared.
+/// Number of pieces of the record whose mean torques are compared.
 const PIECES: usize = 16;
-/// Change of the mean torque, over the largest of it and of the components, and over its scatter, that is worth saying.
+/// Reported change of the mean torque, relative to the largest of mean and components, and relative to its scatter.
 const LOAD_STEP: f64 = 0.2;
 const OVER_SCATTER: f64 = 8.0;
 
-/// A warning if the mean torque changes over the record, as at a load step: components of one load are not those of another.
-/// It is compared over whole periods, in which the components cancel.
+/// A warning if the mean torque changes over the record, as at a load step: the components depend on the load.
+/// Means are taken over whole periods, in which the components cancel.
 pub(super) fn load_changes(
     record: &UniformRecord<Spool>,
     fundamental_hz: f64,
@@ -269,7 +270,7 @@ pub(super) fn load_changes(
     let largest = largest.fold(low.abs().max(high.abs()), f64::max);
     let change = high - low;
     (change > LOAD_STEP * largest && change > OVER_SCATTER * scatter).then(|| {
-        // The largest step, in the middle between the pieces.
+        // The largest step, midway between the pieces.
         let at = (1..PIECES).max_by(|a, b| {
             let step = |k: &usize| (means[*k] - means[k - 1]).abs();
             step(a).total_cmp(&step(b))

@@ -53,7 +53,7 @@ impl Report for HarmonicsReport {
 }
 
 impl HarmonicsReport {
-    /// Heading of the column of uncertainties that the stand brings, if there are any.
+    /// Heading of the column of uncertainties due to the stand, if any.
     fn std_column(&self) -> Option<&'static str> {
         if self.components.iter().any(|c| c.std_stand.is_some()) {
             return Some("± stand");

@@ -1,4 +1,4 @@
-//! Stamps that say when samples arrived, not when they were taken: the decay itself tells.
+//! Time stamps of the arrival of samples instead of sampling instants, detected from the decay itself.
 
 use torqcomp_dsp::dot;
 
@@ -7,20 +7,20 @@ use crate::identify::Identification;
 use crate::print::rounded;
 use crate::warning::Warning;
 
-/// Residual of a decay at even times, over that at its stamps, up to which the samples were taken at even times.
+/// Ratio of the residual of a decay at uniform times to that at its time stamps, up to which sampling was uniform.
 const CLEARLY_LESS: f64 = 0.95;
 
-/// The even times about which stamps scatter.
+/// The uniform times about which time stamps scatter.
 pub(super) struct EvenTimes {
     pub times_s: Vec<f64>,
     pub rate_hz: f64,
-    /// Its standard uncertainty by that scatter.
+    /// Its standard uncertainty from the scatter.
     pub rate_std_hz: f64,
 }
 
 impl EvenTimes {
-    /// The straight line of least squares through stamps over the number of their sample:
-    /// `T = Σ (i − ī) t_i / Σ (i − ī)²`, `u(T) = s / √(Σ (i − ī)²)`; `None` of fewer than three stamps, or where that does not rise.
+    /// Least-squares straight line through the time stamps over the sample number:
+    /// `T = Σ (i − ī) t_i / Σ (i − ī)²`, `u(T) = s / √(Σ (i − ī)²)`; `None` for fewer than three stamps or no rise.
     pub fn of(stamps_s: &[f64]) -> Option<Self> {
         let count = stamps_s.len() as f64;
         let middle = 0.5 * (count - 1.0);
@@ -39,7 +39,7 @@ impl EvenTimes {
     }
 }
 
-/// Whether a decay leaves clearly less at even times than at its stamps.
+/// Whether the residual of a decay is clearly smaller at uniform times than at its time stamps.
 pub(super) fn are_arrivals(
     at_stamps: &Result<Identification, Failure>,
     at_even: &Identification,
@@ -51,7 +51,7 @@ pub(super) fn are_arrivals(
     fits.is_some_and(|(stamps, even)| even.rms < CLEARLY_LESS * stamps.rms)
 }
 
-/// What is said where the samples were taken at even times.
+/// Note on samples taken at uniform times.
 pub(super) fn warning(at_stamps: &Result<Identification, Failure>, rate_hz: f64) -> Warning {
     let left = at_stamps.as_ref().ok().and_then(|found| found.fit.as_ref());
     let left = match left {
@@ -75,7 +75,7 @@ pub(super) fn warning(at_stamps: &Result<Identification, Failure>, rate_hz: f64)
 mod tests {
     use super::*;
 
-    /// By hand: the line through 0, 1.5, 2 and 3.5 has a slope of 1.1, a mean of 1.75 and residuals of ∓0.1, ±0.3.
+    /// By hand: the line through 0, 1.5, 2 and 3.5 has slope 1.1, mean 1.75 and residuals ∓0.1, ±0.3.
     #[test]
     fn a_line_through_four_stamps() {
         let even = EvenTimes::of(&[0.0, 1.5, 2.0, 3.5]).unwrap();

@@ -9,12 +9,12 @@ use crate::identify::{Identification, KnownConstant, ModalPole, NamedEstimate};
 use crate::print::{rounded, short};
 use crate::stand::update::{COMMON, CORRELATIONS, Entry};
 
-/// The ratios that a test determines.
+/// Ratios determined by a test.
 #[derive(Clone, Copy)]
 pub(super) enum Ratios {
-    /// f/J and K/J: a free decay.
+    /// f/J and K/J, from a free decay.
     OverInertia,
-    /// f/K and J/K: torque in, torque out.
+    /// f/K and J/K, from torque in, torque out.
     OverStiffness,
 }
 
@@ -36,7 +36,7 @@ fn entries(constants: &[NamedEstimate], source: &str) -> Vec<Entry> {
     constants.iter().filter_map(one).collect()
 }
 
-/// Adds the ratios of the mode and, if one constant is known, the two others; returns the entries of the stand file.
+/// Adds the ratios from the mode and, if one constant is known, the two others; returns the entries of the stand file.
 pub(super) fn from_ratios(
     anchors: &Anchors,
     findings: &Findings,
@@ -92,7 +92,7 @@ pub(super) fn from_ratios(
     Ok(all)
 }
 
-/// Said where no constant is known that the ratios could be scaled with.
+/// Note if no constant is known to scale the ratios.
 const ONLY_RATIOS: &str = "natural frequency and damping ratio, which compensate needs, are determined, but only \
     ratios of inertia, damping and stiffness; for the constants themselves, give --inertia or --stiffness, or a stand \
     file that declares one";
@@ -135,7 +135,7 @@ fn positive(flag: &str, text: &str, kind: Kind) -> Result<f64, Failure> {
     }
 }
 
-/// Adds inertia, damping and stiffness from the residue of torque in, motion out; returns the entries of the stand file.
+/// Adds inertia, damping and stiffness from the residue for torque in, motion out; returns the stand-file entries.
 pub(super) fn from_residue(
     anchors: &Anchors,
     findings: &Findings,

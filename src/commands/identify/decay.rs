@@ -28,7 +28,7 @@ struct Loaded {
     rate_hz: Option<f64>,
     values: Vec<f64>,
     unit: String,
-    /// Even times in place of stamps that jitter.
+    /// Uniform times replacing time stamps with jitter.
     even: Option<EvenTimes>,
 }
 
@@ -53,7 +53,7 @@ pub fn run(args: &Decay) -> Result<Outcome, Failure> {
     deliver(result, recorded, &args.findings, &entries)
 }
 
-/// Evaluates the records at their stamps; where these jitter, at even times if that leaves clearly less.
+/// Evaluates the records at their time stamps; if these jitter, at uniform times if the residual is clearly smaller.
 fn identified(
     loaded: &[Loaded],
     options: &DecayOptions,
@@ -106,7 +106,7 @@ impl Loaded {
     }
 }
 
-/// Reads one recording, without missing samples: the fit needs no uniform steps.
+/// Reads one recording, without missing samples, as the fit needs no uniform steps.
 fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, Failure> {
     let Reading {
         rate_hz, resample, ..
@@ -154,7 +154,7 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
     ];
     let warnings = warnings.concat();
     recorded.warn(warnings, recording.lost.is_some());
-    // The other channels make room for the fit.
+    // Frees the other channels before the fit.
     let channel = recording.channels.swap_remove(place);
     drop(recording);
     let (times_s, values, rate_hz) = ringing(channel, clock, rate_hz.is_some());
@@ -169,8 +169,8 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
     })
 }
 
-/// Times and samples of a channel that starts at a time and has a rate, and that rate if the times are uniform; a given rate
-/// counts in place of its stamps.
+/// Times and samples of a channel with a start time and rate, and the rate if the times are uniform; a given rate
+/// replaces the time stamps.
 fn ringing(
     channel: Channel,
     (start_s, rate_hz): (f64, f64),
@@ -181,7 +181,7 @@ fn ringing(
     let is_grid = stamps
         .as_ref()
         .is_none_or(|stamps| is_uniform(stamps, rate_hz));
-    // Uniform stamps are those of a grid but for their rounding.
+    // Uniform time stamps are a grid apart from rounding.
     let times_s = match stamps {
         Some(stamps) if !is_grid => Arc::unwrap_or_clone(stamps),
         _ => (0..samples.len())
@@ -193,8 +193,8 @@ fn ringing(
     (times_s, values, is_uniform.then_some(rate_hz))
 }
 
-/// A warning about stamps that jitter and are taken as they are: where they only say when samples arrived, one decay looks
-/// like several modes.
+/// A warning about jittering time stamps used as they are: if they are only arrival times of the samples, a single-mode
+/// decay appears to have several modes.
 fn jitter(channel: &Channel, reading: &Reading) -> Vec<Warning> {
     let axis = &channel.axis;
     let mut found = match reading.rate_hz {
@@ -205,7 +205,7 @@ fn jitter(channel: &Channel, reading: &Reading) -> Vec<Warning> {
     found
 }
 
-/// The samples that are numbers and later than all before them, with their times.
+/// The samples that are numbers and later than all previous ones, with their times.
 fn rising(stamps: Vec<f64>, samples: Vec<f64>) -> (Vec<f64>, Vec<f64>) {
     let is_rising = stamps.windows(2).all(|pair| pair[0] < pair[1]);
     if is_rising && stamps.len() == samples.len() && samples.iter().all(|v| v.is_finite()) {
@@ -221,7 +221,7 @@ fn rising(stamps: Vec<f64>, samples: Vec<f64>) -> (Vec<f64>, Vec<f64>) {
     later.unzip()
 }
 
-/// A recording that was interpolated to a uniform step.
+/// A recording interpolated to a uniform step.
 fn resampled(input: &Path, mut aligned: AlignedChannels, recorded: &mut Recorded) -> Loaded {
     let clipped = [aligned.warnings.clone(), quality::clipped(&aligned)].concat();
     let channel = aligned.channels.swap_remove(0);
@@ -243,7 +243,7 @@ fn resampled(input: &Path, mut aligned: AlignedChannels, recorded: &mut Recorded
     }
 }
 
-/// Adds the constants that follow from the strongest mode; returns the entries of the stand file.
+/// Adds the constants from the strongest mode; returns the entries of the stand file.
 fn entries(args: &Decay, result: &mut Identification) -> Result<Vec<Entry>, Failure> {
     let several = result.modes.len() > 1 && args.findings.result.output.is_some();
     let mode = (&result.modes[0].clone(), Ratios::OverInertia);
@@ -255,7 +255,7 @@ fn entries(args: &Decay, result: &mut Identification) -> Result<Vec<Entry>, Fail
     }
 }
 
-/// Frequency and damping of several modes, by rising frequency, for a stand file.
+/// Frequency and damping of several modes, by ascending frequency, for a stand file.
 fn modes(result: &mut Identification, source: &str) -> Entry {
     result.warn("residues-unknown", NO_RESIDUES);
     let mut all = result.modes.clone();
@@ -272,7 +272,7 @@ fn modes(result: &mut Identification, source: &str) -> Entry {
     Entry::modes(all.iter().map(entries).collect())
 }
 
-/// Said of several modes of a decay.
+/// Note on several modes of a decay.
 const NO_RESIDUES: &str = "a decay gives frequency and damping of each mode, but not its residue in the response to a \
     torque; residues in the stand file are kept if the number of modes is the same; otherwise add residue to each of \
     [[modes]], or use identify response with a known torque or force";

@@ -31,7 +31,7 @@ const FORCE: Dimension = Dimension::new([1, 1, -2, 0, 0, 0]);
 /// Runs the verb.
 pub fn run(args: &Identify) -> Result<Outcome, Failure> {
     let (findings, inputs) = args.test.target();
-    // What cannot be written is refused before the work.
+    // Rejects unwritable outputs before the work.
     Targets::open(findings, inputs)?;
     match &args.test {
         Test::Decay(args) => decay::run(args),
@@ -41,7 +41,7 @@ pub fn run(args: &Identify) -> Result<Outcome, Failure> {
     }
 }
 
-/// What was read, for the result.
+/// Inputs read, for the result.
 #[derive(Default)]
 struct Recorded {
     inputs: Vec<PathBuf>,
@@ -53,7 +53,7 @@ struct Recorded {
 }
 
 impl Recorded {
-    /// Adds a file; the sampling rate, with its standard uncertainty, is that of the first one.
+    /// Adds a file; sampling rate and its standard uncertainty are those of the first file.
     fn add(&mut self, input: &Path, samples: usize, rate_hz: Option<(f64, Option<f64>)>) {
         if self.inputs.is_empty() {
             self.rate_hz = rate_hz.map(|(rate_hz, _)| rate_hz);
@@ -70,19 +70,19 @@ impl Recorded {
     }
 }
 
-/// Text of the stand file that declared values come from, with its name.
+/// Text and name of the stand file with the declared values.
 fn stand_text(findings: &Findings) -> Result<Option<(String, String)>, Failure> {
     let declaring = findings.stand.as_deref().or_else(|| existing(findings));
     declaring.map(stand::text).transpose()
 }
 
-/// The stand file of `-o`, if it is there already.
+/// The stand file of `-o`, if it already exists.
 fn existing(findings: &Findings) -> Option<&Path> {
     let place = findings.result.output.as_deref()?;
     (!is_dash(place) && place.is_file()).then_some(place)
 }
 
-/// A value of `[mechanics]` that is declared, and its standard uncertainty.
+/// A declared value of `[mechanics]` and its standard uncertainty.
 fn declared(
     stand: Option<&(String, String)>,
     key: &str,
@@ -129,7 +129,7 @@ fn deliver(
         let provenance = Provenance::of(&recorded.inputs, stand)?;
         page.write(result.page(&provenance).as_bytes())?;
     }
-    // Standard output has the stand file.
+    // Standard output contains the stand file.
     if findings.json || findings.result.output.is_none() || !findings.result.is_stdout() {
         output::print(&result.document(findings.json))?;
     }
@@ -141,14 +141,14 @@ fn deliver(
     ))
 }
 
-/// The files that the verb writes.
+/// The files written by the verb.
 struct Targets {
     stand: Option<Output>,
     page: Option<Output>,
 }
 
 impl Targets {
-    /// Opens them; a stand file that is there is updated.
+    /// Opens them; an existing stand file is updated.
     fn open(findings: &Findings, inputs: &[PathBuf]) -> Result<Self, Failure> {
         let result = &findings.result;
         if result.output.as_deref().is_some_and(is_dash) && findings.json {
@@ -172,7 +172,7 @@ impl Targets {
     }
 }
 
-/// The stand file with the entries: the existing one, a copy of that of `--stand`, or a new one.
+/// The stand file with the entries: the existing one, a copy of the one given by `--stand`, or a new one.
 fn stand_file(findings: &Findings, entries: &[Entry]) -> Result<String, Failure> {
     let basis = existing(findings).or(findings.stand.as_deref());
     match basis.map(stand::text).transpose()? {
@@ -184,7 +184,7 @@ fn stand_file(findings: &Findings, entries: &[Entry]) -> Result<String, Failure>
     }
 }
 
-/// The unit of a channel, which is given with that flag if the file does not say it.
+/// Unit of a channel, from the flag if the file does not give it.
 fn unit_or(channel: RecordedChannel, flag: &str) -> Result<NamedUnit, Failure> {
     channel.unit.cloned().ok_or_else(|| {
         let name = channel.name;
@@ -205,7 +205,7 @@ fn unit_or(channel: RecordedChannel, flag: &str) -> Result<NamedUnit, Failure> {
     })
 }
 
-/// Reads a quantity of the command line.
+/// Reads a quantity from the command line.
 fn quantity(flag: &str, text: &str, kind: Kind) -> Result<f64, Failure> {
     kind.parse(text).map_err(|error| {
         Failure::usage(

@@ -1,4 +1,4 @@
-//! Several modes of a response, as a stand file takes them.
+//! Several modes of a response in the form of a stand file.
 
 use torqcomp_model::Estimate;
 
@@ -10,10 +10,10 @@ use crate::stand::update::{self, Entry};
 use crate::stand::{MODE_CORRELATIONS, TransducerSignal};
 use crate::unit::NamedUnit;
 
-/// Smallest correlation that is written.
+/// Minimum correlation written.
 const WORTH_WRITING: f64 = 0.01;
 
-/// What is known of the records beside the modes.
+/// Known properties of the records besides the modes.
 pub(super) struct WrittenModes<'a> {
     pub source: String,
     pub motion: Motion,
@@ -25,7 +25,7 @@ impl WrittenModes<'_> {
     /// Entries of the stand file.
     ///
     /// # Errors
-    /// If the stand file that is updated cannot be read.
+    /// If the stand file to be updated cannot be read.
     pub(super) fn entries(
         &self,
         shares: &ModalShares,
@@ -54,7 +54,7 @@ impl WrittenModes<'_> {
         Ok(all)
     }
 
-    /// Whether torque acts, and the record is one or becomes one by a calibration.
+    /// Whether the input is a torque, and the record is one or can be converted to one by a calibration.
     fn is_torque(&self) -> bool {
         let [Some(measured), Some(applied)] = self.units else {
             return false;
@@ -63,7 +63,7 @@ impl WrittenModes<'_> {
         applied.unit.dimension() == TORQUE && (measured.unit.dimension() == TORQUE || is_signal)
     }
 
-    /// The response at rest in the units of the channels; 1 stands for an unknown one.
+    /// Static response in the units of the channels; 1 if unknown.
     fn gain(&self, gain: &Estimate) -> Estimate {
         let texts = self
             .units

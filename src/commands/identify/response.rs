@@ -77,7 +77,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
     deliver(result, recorded, &args.findings, &entries)
 }
 
-/// What the measured channel is of the motion.
+/// Motion quantity of the measured channel.
 fn motion_of(args: &Response, name: &str, unit: Option<&NamedUnit>) -> Result<Motion, Failure> {
     if let Some(motion) = args.measured_as {
         return Ok(motion);
@@ -94,7 +94,7 @@ fn motion_of(args: &Response, name: &str, unit: Option<&NamedUnit>) -> Result<Mo
     Ok(by_unit.map_or(Motion::Displacement, |(motion, _)| motion))
 }
 
-/// How the response is evaluated.
+/// Evaluation of the response.
 fn options(args: &Response, motion: Motion) -> ResponseOptions {
     ResponseOptions {
         excitation: args.excitation,
@@ -108,11 +108,11 @@ fn options(args: &Response, motion: Motion) -> ResponseOptions {
     }
 }
 
-/// Said where no mode moves at rest.
+/// Note if no mode has a static gain.
 const NOT_AT_REST: &str = "the static response of these modes is zero, but a stand file scales residues by it; choose \
     another --band";
 
-/// Makes a torque of a force that acts at a radius.
+/// Converts a force at a radius to a torque.
 fn to_torque(force: &mut AlignedChannel, radius: &str) -> Result<(), Failure> {
     let radius_m = quantity("--radius", radius, Kind::Length)?;
     if radius_m <= 0.0 {
@@ -137,7 +137,7 @@ fn to_torque(force: &mut AlignedChannel, radius: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The calibration of a signal by a known torque: torque over signal at rest, for a stand file that has none.
+/// Calibration of a signal by a known torque: static torque over signal, for a stand file without calibration.
 fn calibration(
     args: &Response,
     units: [Option<&NamedUnit>; 2],
@@ -168,10 +168,10 @@ fn calibration(
     let written = entry("calibration", key, &constant, &source);
     result.parameters.push(constant);
     if std.is_none() {
-        // These records do not tell how far it may be off.
+        // Its error is not identifiable from these records.
         return Ok(Vec::new());
     }
-    // Weights on the stand are more exact than what a hammer says of a load at rest.
+    // Weights on the stand are more accurate than the static gain from a hammer test.
     let stand = stand_text(&args.findings)?;
     Ok(
         match stand.is_some_and(|(_, text)| update::is_calibrated(&text)) {
@@ -181,7 +181,7 @@ fn calibration(
     )
 }
 
-/// Gives the static gain its unit: that of the measured channel over that of the applied one.
+/// Sets the unit of the static gain: measured channel over applied channel.
 fn name_gain(result: &mut Identification, record: &AlignedChannels) {
     let unit = |k: usize| record.channels[k].unit.as_ref().map(|unit| &unit.text);
     let gain = result
@@ -199,8 +199,8 @@ fn name_gain(result: &mut Identification, record: &AlignedChannels) {
     }
 }
 
-/// Rad (or rad/s, rad/s²) per N m of one unit measured per unit applied; `None` unless the one is a motion and the other
-/// a torque.
+/// Rad (or rad/s, rad/s²) per N m for one measured unit per applied unit; `None` unless the former is a motion and the
+/// latter a torque.
 fn rad_per_n_m(
     args: &Response,
     loaded: &[AlignedChannels],
@@ -227,7 +227,7 @@ fn rad_per_n_m(
     }
 }
 
-/// Adds the constants that follow from a single mode; returns the entries of the stand file.
+/// Adds the constants from a single mode; returns the entries of the stand file.
 fn entries(
     args: &Response,
     rad_per_n_m: Option<f64>,

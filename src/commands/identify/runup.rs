@@ -137,8 +137,8 @@ fn effort_factor(args: &Runup, torque: &AlignedChannel, turning: bool) -> Result
     }
 }
 
-/// `"35.15 N/V"`: SI units of torque or force per number of the channel, and their dimension. A channel without a known unit
-/// is in the unit of the factor.
+/// `"35.15 N/V"`: SI units of torque or force per number of the channel, and their dimension. A channel without a known
+/// unit is in the unit of the factor.
 fn factor_of(text: &str, channel: RecordedChannel) -> Result<(f64, Dimension), Failure> {
     let wrong = || {
         Failure::usage(

@@ -20,7 +20,7 @@ use crate::warning::Warning;
 
 const MASS: Dimension = Dimension::new([1, 0, 0, 0, 0, 0]);
 
-/// Gravity on the ground, mountains included, in m/s².
+/// Range of gravity on the Earth's surface, including mountains, in m/s².
 const ON_EARTH: std::ops::RangeInclusive<f64> = 9.76..=9.84;
 
 /// Runs the test.
@@ -31,7 +31,7 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
             "--resample does not apply: a table of loads has no time axis",
         ));
     }
-    // A table of loads has no time axis; with a rate none is searched for.
+    // A table of loads has no time axis; a given rate prevents the search for one.
     let reading = Reading {
         rate_hz: args.table.rate_hz.or(Some(1.0)),
         ..args.table.clone()
@@ -55,7 +55,7 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
     deliver(result, recorded, &args.findings, &entries)
 }
 
-/// The columns that are read.
+/// The columns read.
 struct Columns {
     load: ChannelChoice,
     reading: ChannelChoice,
@@ -94,7 +94,7 @@ impl Columns {
     }
 }
 
-/// Loads and readings in SI units, with the units' names, and warnings of units that contradict the headings.
+/// Loads and readings in SI units, with the names of the units, and warnings about units that contradict the headings.
 fn points(
     args: &Static,
     columns: &Columns,
@@ -153,8 +153,8 @@ fn points(
     Ok((points, LoadUnits { load, reading }))
 }
 
-/// Standard uncertainties of the readings, as these are evaluated: in the unit of their column, or without one in that of the
-/// readings.
+/// Standard uncertainties of the readings, converted like these: in the unit of their column, or by default in that of
+/// the readings.
 fn stds(
     args: &Static,
     columns: &Columns,
@@ -202,7 +202,7 @@ fn stds(
     }
 }
 
-/// Numbers of series that are told apart at each mounting as well: they may begin anew there.
+/// Numbers of series, made distinct between mounting positions, as numbering may restart at each.
 fn at_mountings(series: &[usize], positions: &[usize]) -> Vec<usize> {
     let pairs: Vec<(usize, usize)> = positions
         .iter()
@@ -244,7 +244,7 @@ fn column(
     Ok((channel.samples.clone(), unit))
 }
 
-/// Refuses a gravity of no place on Earth.
+/// Rejects a gravity that occurs nowhere on Earth.
 fn on_earth(gravity: Option<f64>, text: Option<&str>) -> Result<(), Failure> {
     match (gravity, text) {
         (Some(value), Some(text)) if !ON_EARTH.contains(&value) => Err(Failure::usage(
@@ -319,7 +319,7 @@ fn load_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
     }
 }
 
-/// Units of the readings in which they are evaluated per unit of the file, and their name.
+/// Evaluation units of the readings per unit of the file, and their name.
 fn reading_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
     if let Some(signal) = TransducerSignal::of(&unit.unit) {
         let (usual, factor) = signal.usual_unit();
@@ -339,18 +339,18 @@ fn reading_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure>
     Ok((1.0, unit.text.clone()))
 }
 
-/// Numbers the different values from 0, by first appearance.
+/// Numbers the distinct values from 0, by first appearance.
 fn ranks(values: &[f64]) -> Vec<usize> {
     let mut seen = HashMap::new();
     let rank = |value: &f64| {
         let next = seen.len();
-        // 0 and −0 are the same number with different bits.
+        // 0 and −0 are equal but differ in their bits.
         *seen.entry((value + 0.0).to_bits()).or_insert(next)
     };
     values.iter().map(rank).collect()
 }
 
-/// The entries of the stand file: the calibration in the form of the readings' unit, and the zero.
+/// The entries of the stand file: the calibration in the form for the readings' unit, and the zero.
 fn entries(args: &Static, result: &Identification, units: &LoadUnits) -> Vec<Entry> {
     let source = format!("identify static: {}", args.input.shown());
     let is_signal = |signal: &TransducerSignal| signal.usual_unit().0 == units.reading;

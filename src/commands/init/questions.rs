@@ -1,14 +1,14 @@
-//! What `init` asks for, by what there is to start from.
+//! Questions of `init`, by source of data.
 
 use torqcomp_model::Kind;
 
-/// One entry of the file: where it goes, how it is asked for, and what it means.
+/// One entry of the file: its place, question and meaning.
 pub(super) struct Question {
     pub(super) section: &'static str,
     pub(super) key: &'static str,
     /// The flag without its dashes.
     pub(super) flag: &'static str,
-    /// The kind of its quantity; `None` where the unit or a list of words says more.
+    /// Kind of its quantity; `None` if the unit or a list of words determines it.
     pub(super) kind: Option<Kind>,
     pub(super) example: &'static str,
     pub(super) meaning: &'static str,
@@ -65,7 +65,7 @@ pub(super) const TRANSDUCER: [Question; 5] = [
         ["calibration", "rated_torque", "rated-torque"],
         Some(Kind::Torque),
         "50 N m",
-        "torque of that change",
+        "torque for this change",
     ),
     EXCITATION,
     GAIN,
@@ -115,7 +115,7 @@ pub(super) const DRAWING: [Question; 12] = [
         ["gage", "gage_factor", "gage-factor"],
         Some(Kind::Ratio),
         "2.05",
-        "of the gage's data sheet",
+        "from the gage's data sheet",
     ),
     needed(
         ["gage", "resistance", "gage-resistance"],
@@ -138,13 +138,13 @@ const EXCITATION: Question = optional(needed(
     ["bridge", "excitation", "excitation"],
     Some(Kind::Voltage),
     "5 V",
-    "supply of the bridge; needed between volts and mV/V",
+    "supply of the bridge; needed to convert between volts and mV/V",
 ));
 const GAIN: Question = optional(needed(
     ["recorder", "gain", "gain"],
     Some(Kind::Gain),
     "200",
-    "recorded volts per bridge volt; needed between volts and mV/V",
+    "recorded volts per bridge volt; needed to convert between volts and mV/V",
 ));
 const ZERO: Question = optional(needed(
     ["recorder", "zero", "zero"],
@@ -162,29 +162,29 @@ impl Question {
         let skip = if self.is_needed {
             ""
         } else {
-            "; Enter to leave it out"
+            "; Enter to skip"
         };
         format!(
-            "{} ({}), as {}{skip}",
+            "{} ({}), such as {}{skip}",
             self.key.replace('_', " "),
             self.meaning,
             self.example
         )
     }
 
-    /// Whether the file takes a standard uncertainty of it.
+    /// Whether the file accepts its standard uncertainty.
     pub(super) fn has_std(&self) -> bool {
         !matches!(self.key, "layout" | "zero" | "resistance")
     }
 
     pub(super) fn std_text(&self) -> String {
         format!(
-            "standard uncertainty of the {} in its unit or in % of it (a limit divided by 1.73); Enter if unknown",
+            "standard uncertainty of the {}, in its unit or in % (for a limit, divide by 1.73); Enter if unknown",
             self.key.replace('_', " ")
         )
     }
 
-    /// Checks a standard uncertainty of the value that was given.
+    /// Checks the standard uncertainty of the given value.
     pub(super) fn check_std(&self, answer: &str, value: &str) -> Result<(), String> {
         match (answer, self.kind) {
             ("", _) | (_, None) => Ok(()),
@@ -197,7 +197,7 @@ impl Question {
 
     pub(super) fn check(&self, answer: &str) -> Result<(), String> {
         match (answer, self.kind) {
-            ("", _) if self.is_needed => Err(format!("it is needed, as {}", self.example)),
+            ("", _) if self.is_needed => Err(format!("required, such as {}", self.example)),
             ("", _) | (_, None) => Ok(()),
             (text, Some(kind)) => kind
                 .parse(text)

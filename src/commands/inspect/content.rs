@@ -8,23 +8,23 @@ use crate::io::mcap::Inventory;
 use crate::io::{ChannelChoice, Input, Reading};
 use crate::recording::{self, AllSamples, Recording, refuse_for_messages, refuse_for_text};
 
-/// Numbers of a text that are kept at most: eight bytes each.
+/// Maximum number of values kept of a text: eight bytes each.
 const MOST_NUMBERS: usize = 1 << 22;
 
-/// What is in a file.
+/// Content of a file.
 #[derive(Debug, Clone)]
 pub struct Content {
-    /// The channels whose samples were read.
+    /// Channels whose samples were read.
     pub recording: Recording,
-    /// What all samples of a channel come to, where only the first were kept.
+    /// Statistics of all samples of a channel if only the first were kept.
     pub wholes: Vec<Option<AllSamples>>,
-    /// Channels that are only listed: their samples cannot be read, or are too many.
+    /// Channels only listed, as their samples cannot be read or are too many.
     pub listed: Vec<InspectedChannel>,
     /// Everything in an MCAP file.
     pub inventory: Option<Inventory>,
 }
 
-/// Reads a file, whatever its format.
+/// Reads a file of any format.
 pub fn read(place: &Input, reading: &Reading) -> Result<Content, Failure> {
     let mut content = unpacked(place, reading)?;
     content.recording.dialect = place.dialect(&content.recording.dialect);
@@ -38,7 +38,7 @@ fn unpacked(place: &Input, reading: &Reading) -> Result<Content, Failure> {
     }
     refuse_for_text(&ChannelChoice::default(), reading)?;
     let (mut recording, wholes) = match reading.range.is_some() {
-        // Which samples are wanted is known when all are there.
+        // The required samples are known only after reading all of them.
         true => (recording::read(place, reading)?, Vec::new()),
         false => Recording::of_text(place, reading, MOST_NUMBERS)?,
     };

@@ -1,4 +1,4 @@
-//! A recording as a report: what each channel is, and what is wrong with it.
+//! Report of a recording: description and faults of each channel.
 
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ pub fn file(content: &Content) -> InspectedFile {
         let names: Vec<String> = members.iter().map(|i| labels[*i].clone()).collect();
         let all = members.len() == channels.len();
         let mut found = found.warnings(&whose(&names, all), axis);
-        // The reader may have said it already.
+        // The reader may have reported it already.
         found.retain(|w| recording.warnings.iter().all(|said| said.code != w.code));
         warnings.extend(found.into_iter().map(|w| said(w, names.clone())));
     }
@@ -66,19 +66,19 @@ pub fn file(content: &Content) -> InspectedFile {
     }
 }
 
-/// What is wrong with the file as a whole.
+/// Faults of the file as a whole.
 fn of_file(recording: &Recording) -> Vec<ChannelWarning> {
     recording
         .lost
         .iter()
         .chain(&recording.warnings)
-        // What is said of each channel need not be said of the file.
+        // Warnings about each channel need not be repeated for the file.
         .filter(|warning| warning.code != "non-finite")
         .map(|warning| said(warning.clone(), Vec::new()))
         .collect()
 }
 
-/// A warning with the names of the channels that it is about.
+/// A warning with the names of the channels concerned.
 pub fn said(warning: Warning, channels: Vec<String>) -> ChannelWarning {
     ChannelWarning {
         code: warning.code,
@@ -131,17 +131,17 @@ fn whose(names: &[String], all: bool) -> String {
     }
 }
 
-/// Looks at all channels, several at once.
+/// Examines all channels, several at a time.
 fn examine(channels: &[Channel]) -> Vec<Findings> {
     parallel(channels.len(), threads(), |i| {
         Findings::of(&channels[i].samples, channels[i].axis.rate_hz)
     })
 }
 
-/// Channels with the same fault from which on it is said once for all of them.
+/// Number of channels with the same fault from which it is reported once for all of them.
 const MANY: usize = 4;
 
-/// What is wrong with the samples; what many channels have in common is said once.
+/// Faults of the samples; those common to many channels are reported once.
 fn of_channels(
     channels: &[Channel],
     labels: &[String],
@@ -171,7 +171,7 @@ fn of_channels(
     all
 }
 
-/// Puts warnings of one code about many channels together.
+/// Combines warnings of one code about many channels.
 fn gathered(warnings: Vec<ChannelWarning>) -> Vec<ChannelWarning> {
     let mut out: Vec<ChannelWarning> = Vec::new();
     for warning in &warnings {
@@ -259,7 +259,7 @@ fn absolute(event: Event, origin_s: f64) -> Event {
     }
 }
 
-/// Adds what the stamps show.
+/// Adds findings from the time stamps.
 fn with_steps(
     channel: InspectedChannel,
     origin_ns: i64,
@@ -288,7 +288,7 @@ fn with_steps(
     }
 }
 
-/// Adds what the samples show.
+/// Adds findings from the samples.
 fn with_samples(channel: InspectedChannel, found: &Findings) -> InspectedChannel {
     let rail = |of: fn(&Clipping) -> Option<f64>| found.clipping.as_ref().and_then(of);
     let lines = found.mains.iter().flat_map(|mains| &mains.lines);

@@ -15,19 +15,19 @@ use crate::recording::{AllSamples, Channel, Recording, TimeAxis, message_times};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
-/// Samples that are kept at most, of all numbers together: eight bytes each, and as many for stamps.
+/// Maximum number of samples kept of all numbers together: eight bytes each, and as many for time stamps.
 const MOST_SAMPLES: u64 = 1 << 22;
-/// Longest file whose samples are read, in bytes.
+/// Maximum length of a file whose samples are read, in bytes.
 const MOST_BYTES: u64 = 4_000_000_000;
-/// Numbers that are read at most.
+/// Maximum number of numeric fields read.
 const MOST_NUMBERS: u64 = 64;
 
-/// Lists a file and reads the numbers in it, as far as they are not too many.
+/// Lists a file and reads its numbers, up to a maximum.
 pub fn read(place: &Input, reading: &Reading) -> Result<Content, Failure> {
     read_most(place, reading, MOST_SAMPLES)
 }
 
-/// The same, keeping so many samples of all numbers together.
+/// The same, keeping the given number of samples of all numbers together.
 fn read_most(place: &Input, reading: &Reading, most: u64) -> Result<Content, Failure> {
     let mut inventory = Inventory::scan(place)?;
     if let Some(wanted) = &reading.topic {
@@ -60,13 +60,13 @@ fn read_most(place: &Input, reading: &Reading, most: u64) -> Result<Content, Fai
             content.recording.channels.push(channel);
             content.wholes.push(whole);
             let warnings = &mut content.recording.warnings;
-            // A list that no message fills has no number in this file.
+            // A list that is empty in all messages has no number in this file.
             let mut said = summary.warnings;
             said.retain(|warning| summary.samples > 0 || warning.code != "mcap-without-item");
             is_lossy |= summary.is_lossy;
             add_warnings(warnings, said, &inventory.warnings);
         } else {
-            // Lists that are empty at first, and the like: the warnings name what is damaged.
+            // Initially empty lists and similar; the warnings report damage.
             content.listed.push(entry(topic, number));
         }
     }
@@ -83,7 +83,7 @@ fn read_most(place: &Input, reading: &Reading, most: u64) -> Result<Content, Fai
     Ok(content)
 }
 
-/// What is known of a file before its samples are read.
+/// Known properties of a file before reading its samples.
 fn of_file(inventory: &Inventory) -> Content {
     Content {
         recording: Recording {
@@ -98,20 +98,20 @@ fn of_file(inventory: &Inventory) -> Content {
     }
 }
 
-/// A warning about a topic whose messages are not those of one signal, unless that is said of it already.
+/// A warning about a topic whose messages are not one signal, unless already given.
 fn mixed(topic: &ChannelReport, failure: &Failure) -> Option<Warning> {
     let is_new = topic.unreadable.is_none() && failure.code() == Some(ErrorCode::RecordsDiffer);
     is_new.then(|| Warning::new("mcap-unreadable", failure.to_string()))
 }
 
-/// The numbers of a file, and which of them are read.
+/// The numbers of a file and those selected for reading.
 struct Numbers<'a> {
-    /// Each with its topic and whether it is read; a topic without numbers is there once.
+    /// Each with its topic and whether it is read; one entry for a topic without numbers.
     listed: Vec<(&'a ChannelReport, Option<&'a LeafReport>, bool)>,
-    /// Those that are read, and what is kept of them.
+    /// Those read, and the samples kept of them.
     choices: Vec<FieldChoice>,
     kept: Vec<Kept>,
-    /// Those with messages for which there is no room.
+    /// Those with messages that exceed the limits.
     left_out: usize,
 }
 
@@ -142,7 +142,7 @@ impl<'a> Numbers<'a> {
     }
 }
 
-/// Leaves out all other topics.
+/// Omits all other topics.
 fn keep_topic(inventory: &mut Inventory, wanted: &str) -> Result<(), Failure> {
     inventory.channels.retain(|channel| channel.topic == wanted);
     if inventory.channels.is_empty() {
@@ -173,7 +173,7 @@ fn not_read(left_out: usize) -> Warning {
     )
 }
 
-/// What may still be read.
+/// Remaining capacity for reading.
 struct Budget {
     numbers: u64,
     samples: u64,
@@ -195,8 +195,8 @@ impl Budget {
         }
     }
 
-    /// Samples that are kept of a number with that many messages: all, or its equal part of what is
-    /// left. `None` if it is not to be read.
+    /// Samples kept of a number with that many messages: all, or its equal part of what is
+    /// left. `None` if it must not be read.
     fn share(&mut self, messages: u64) -> Option<usize> {
         let equal = self.samples.checked_div(self.numbers)?;
         if messages == 0 {
@@ -208,7 +208,7 @@ impl Budget {
     }
 }
 
-/// A number that was read, and what all of its samples come to if not all were kept.
+/// A number read, and statistics of all its samples if not all were kept.
 fn channel(
     topic: &ChannelReport,
     number: &LeafReport,
@@ -240,7 +240,7 @@ fn channel(
     (channel, whole)
 }
 
-/// An axis of stamps that are counted from the first: seconds since 1970 would cost them their last
+/// An axis of time stamps relative to the first: as seconds since 1970 they would lose their last
 /// digits.
 fn axis(stamps: Stamps, words: String) -> TimeAxis {
     let origin_ns = stamps.first_ns.unwrap_or(0);
@@ -259,7 +259,7 @@ fn name(topic: &ChannelReport, number: Option<&LeafReport>) -> String {
     }
 }
 
-/// A channel whose samples are not known.
+/// A channel with unknown samples.
 fn entry(topic: &ChannelReport, number: Option<&LeafReport>) -> InspectedChannel {
     let start_ns = topic.log_ns.map(|(first, _)| first);
     InspectedChannel {
@@ -279,7 +279,7 @@ fn entry(topic: &ChannelReport, number: Option<&LeafReport>) -> InspectedChannel
     }
 }
 
-/// Adds what was found reading one number and is not said of the file already.
+/// Adds findings from reading one number that are not yet reported for the file.
 fn add_warnings(all: &mut Vec<Warning>, more: Vec<Warning>, of_file: &[Warning]) {
     for warning in more {
         if !all.contains(&warning) && of_file.iter().all(|said| said.code != warning.code) {
@@ -348,7 +348,7 @@ mod tests {
     use super::*;
     use crate::io::mcap::testing;
 
-    /// What is kept does not grow with the file: a short topic, a long and a longer one.
+    /// Kept samples do not grow with the file: a short, a long and a longer topic.
     #[test]
     fn long_topics_share_what_may_be_kept() {
         let mut file = testing::File::new(testing::options(None));

@@ -1,4 +1,4 @@
-//! `inspect`: what recordings hold, and what is wrong with them.
+//! `inspect`: content and faults of recordings.
 
 mod content;
 mod describe;
@@ -62,7 +62,7 @@ pub fn work(args: &Inspect) -> Result<Made, Failure> {
     compare(args).map(|(made, _)| made)
 }
 
-/// Inspects files and compares them; also why some of several could not be read.
+/// Inspects files and compares them; includes why some of several could not be read.
 fn compare(args: &Inspect) -> Result<(Made, Vec<Failure>), Failure> {
     check(args)?;
     let inputs: Vec<&Path> = args.files.iter().map(PathBuf::as_path).collect();
@@ -85,7 +85,7 @@ fn compare(args: &Inspect) -> Result<(Made, Vec<Failure>), Failure> {
     Ok((made, read.into_iter().filter_map(Result::err).collect()))
 }
 
-/// Refuses what cannot be done.
+/// Rejects impossible requests.
 fn check(args: &Inspect) -> Result<(), Failure> {
     if args.files.iter().filter(|file| is_dash(file)).count() > 1 {
         return Err(Failure::usage(
@@ -112,7 +112,7 @@ fn entry((read, file): (&Result<Content, Failure>, &PathBuf)) -> Inspected {
     }
 }
 
-/// What comparing the files shows. Files that are the same need no comparison of their channels.
+/// Findings from comparing the files. Channels of identical files need no comparison.
 fn between(files: &[PathBuf], read: &[Result<Content, Failure>]) -> Vec<ChannelWarning> {
     let (mut found, firsts) = same::files(files);
     let recordings: Vec<&Recording> = firsts
@@ -126,7 +126,7 @@ fn between(files: &[PathBuf], read: &[Result<Content, Failure>]) -> Vec<ChannelW
         .collect()
 }
 
-/// Writes everything that was found.
+/// Writes all findings.
 fn finish(
     args: &Inspect,
     report: &InspectReport,

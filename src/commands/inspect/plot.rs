@@ -1,4 +1,4 @@
-//! The picture of the channels.
+//! Chart of the channels.
 
 use torqcomp_dsp::quality::range;
 
@@ -13,10 +13,10 @@ const SAMPLES: &str = "sample number, no unit";
 
 /// Height of a channel's panel, in user units.
 const HEIGHT: f64 = 120.0;
-/// Times farther from zero than this many lengths of the record are counted from its start.
+/// Times farther from zero than this many record lengths are given relative to the start of the record.
 const FAR: f64 = 1e4;
 
-/// Draws every channel of every file that was read.
+/// Draws every channel of every file read.
 pub fn svg(recordings: &[&Recording], report: &InspectReport) -> String {
     let found = report.files.iter().filter_map(|entry| match entry {
         Inspected::Read(file) => Some(file.as_ref()),

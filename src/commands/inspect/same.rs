@@ -1,4 +1,4 @@
-//! Files that are the same, byte by byte, though named differently.
+//! Identical files with different names.
 
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -7,10 +7,10 @@ use crate::file_name::{ShowPath, is_dash};
 use crate::io::storage::Stored;
 use crate::warning::Warning;
 
-/// Bytes that are compared at a time.
+/// Number of bytes compared at a time.
 const PIECE: usize = 1 << 16;
 
-/// The warnings about files that hold the same bytes, and the numbers of those that differ from all
+/// The warnings about files with the same bytes, and the numbers of those that differ from all
 /// before them. Standard input is different from all.
 pub fn files(names: &[PathBuf]) -> (Vec<Warning>, Vec<usize>) {
     let mut groups: Vec<Vec<usize>> = Vec::new();

@@ -3,12 +3,12 @@
 use super::report::{ChannelWarning, InspectReport, Inspected, InspectedChannel, InspectedFile};
 use crate::print::{Report, columns, plural, rounded, short};
 
-/// Lines of the head that are shown, and characters of each.
+/// Maximum number of header lines shown, and of characters of each.
 const MOST_DETAILS: usize = 12;
 const LINE_WIDTH: usize = 100;
-/// Characters of a unit that the table shows.
+/// Maximum number of characters of a unit in the table.
 const UNIT_WIDTH: usize = 24;
-/// Characters of a name that the table shows.
+/// Maximum number of characters of a name in the table.
 const NAME_WIDTH: usize = 44;
 
 impl Report for InspectReport {
@@ -101,7 +101,7 @@ impl InspectedFile {
         text
     }
 
-    /// Where the rates come from: one line for each time axis.
+    /// Origin of the rates: one line for each time axis.
     fn time(&self) -> String {
         let mut axes: Vec<(String, Vec<usize>)> = Vec::new();
         for (i, channel) in self.channels.iter().enumerate() {
@@ -125,7 +125,7 @@ impl InspectedFile {
     }
 }
 
-/// The beginning of a text that is too long.
+/// A text, truncated if too long.
 fn shortened(text: &str, most: usize) -> String {
     if text.chars().count() <= most {
         return text.to_owned();
@@ -135,7 +135,7 @@ fn shortened(text: &str, most: usize) -> String {
     short
 }
 
-/// A name, its middle left out if it is too long: both ends tell more.
+/// A name, without its middle if too long, as both ends are more informative.
 fn middle_left_out(name: &str) -> String {
     let count = name.chars().count();
     if count <= NAME_WIDTH {

@@ -1,4 +1,4 @@
-//! Channels too long to be kept: their first samples, and what all of them come to.
+//! Channels too long to be kept: their first samples, and statistics of all.
 
 use torqcomp_dsp::quality::sums::SampleSums;
 
@@ -7,7 +7,7 @@ use crate::print::plural;
 use crate::recording::{AllSamples, Channel};
 use crate::warning::Warning;
 
-/// Stamps as far as they were kept.
+/// Time stamps as far as kept.
 #[derive(Debug, Default)]
 pub struct Stamps {
     /// The first, in ns since the clock's zero.
@@ -16,7 +16,7 @@ pub struct Stamps {
     pub from_first_s: Vec<f64>,
 }
 
-/// The first samples of a channel that goes by, and sums over all.
+/// The first samples of a channel read as a stream, and sums over all.
 #[derive(Debug, Default)]
 pub struct Kept {
     most: usize,
@@ -27,7 +27,7 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// Keeps so many samples.
+    /// Keeps the given number of samples.
     pub fn new(most: usize) -> Self {
         Self {
             most,
@@ -35,7 +35,7 @@ impl Kept {
         }
     }
 
-    /// Takes samples with their stamps in ns.
+    /// Takes samples with their time stamps in ns.
     pub fn add(&mut self, times_ns: &[i64], values: &[f64]) {
         let Some(last) = times_ns.last() else {
             return;
@@ -54,7 +54,7 @@ impl Kept {
         values.iter().for_each(|value| self.sums.add(*value));
     }
 
-    /// Stamps and samples that were kept, and the sums if there were more.
+    /// The time stamps and samples kept, and the sums if there were more.
     pub fn finish(self) -> (Stamps, Vec<f64>, Option<AllSamples>) {
         let first = self.stamps.first_ns.unwrap_or(self.last_ns);
         let all = AllSamples {
@@ -66,7 +66,7 @@ impl Kept {
     }
 }
 
-/// The description of what was kept of a channel, with what is known of all samples.
+/// Description of the kept part of a channel, with the statistics of all samples.
 pub fn describe(all: &AllSamples, kept: InspectedChannel) -> InspectedChannel {
     InspectedChannel {
         samples: all.sums.samples,
@@ -80,7 +80,7 @@ pub fn describe(all: &AllSamples, kept: InspectedChannel) -> InspectedChannel {
     }
 }
 
-/// The warning that only the first samples were checked, if that is so of any channel.
+/// The warning that only the first samples were checked, if this applies to any channel.
 pub fn warning(channels: &[Channel], all: &[Option<AllSamples>]) -> Option<Warning> {
     let long = channels.iter().zip(all);
     let long: Vec<(usize, usize)> = long

@@ -1,4 +1,4 @@
-//! A calibration beside what the drawing gives for the same signal.
+//! Comparison of a calibration with the drawing for the same signal.
 
 use torqcomp_model::{Estimate, UnitSystem};
 
@@ -7,7 +7,7 @@ use super::report::PredictedConstant;
 use crate::stand::TransducerSignal;
 
 impl Drawing<'_> {
-    /// The calibration in its own signal, where that is not a voltage; without one, that of the bridge in V/V.
+    /// The calibration in its own signal, if not a voltage; without calibration, that of the bridge in V/V.
     pub(super) fn calibration(&self, units: UnitSystem) -> Option<PredictedConstant> {
         let measured = self.stand.calibration.as_ref();
         let signal = measured.map_or(TransducerSignal::Ratio, |measured| measured.signal);

@@ -1,4 +1,4 @@
-//! The constants of a drawing beside the measured ones, as they are printed.
+//! Printed comparison of the constants from a drawing with the measured ones.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -102,7 +102,7 @@ fn cell(value: Option<f64>, std: Option<f64>) -> String {
 }
 
 fn percent(value: Option<f64>) -> String {
-    // A prediction that misses nearly all is not to be rounded to nothing.
+    // A prediction that misses nearly everything must not be rounded to zero.
     match value {
         None => "-".to_owned(),
         Some(v) if (v.abs() - 100.0).abs() < 0.05 => format!("{v:+.4}"),
@@ -111,7 +111,7 @@ fn percent(value: Option<f64>) -> String {
 }
 
 impl PredictedConstant {
-    /// A predicted number beside a measured one, both in the printed unit.
+    /// A predicted and a measured number, both in the printed unit.
     pub(super) fn between(
         name: &'static str,
         predicted: Option<&Estimate>,

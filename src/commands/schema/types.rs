@@ -1,5 +1,5 @@
-//! JSON Schemas from the types of the documents. The program brings their texts along: the code that makes them takes
-//! 0.3 MiB more of it than the texts do.
+//! JSON Schemas from the types of the documents. The program contains their texts, as the code that generates them
+//! is 0.3 MiB larger than the texts.
 
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
@@ -36,7 +36,7 @@ pub(crate) fn texts() -> Vec<String> {
         .collect()
 }
 
-/// The schema of a document `D` with a report `R`: no keys but those of the types.
+/// The schema of a document `D` with a report `R`, without keys other than those of the types.
 fn closed<D: JsonSchema, R: JsonSchema>(name: &str) -> Value {
     let settings = || {
         let settings = SchemaSettings::draft2020_12().for_serialize();
@@ -54,7 +54,7 @@ fn closed<D: JsonSchema, R: JsonSchema>(name: &str) -> Value {
     schema
 }
 
-/// Says the name of the document where it says it itself.
+/// Sets the name of the document in its own schema key.
 fn name_it(schema: &mut Value, name: &str) {
     if let Some(own) = schema.pointer_mut("/properties/schema") {
         own["const"] = json!(name);
@@ -69,10 +69,10 @@ fn name_it(schema: &mut Value, name: &str) {
     }
 }
 
-/// Keywords with schemas that hold for the same object.
+/// Keywords whose schemas apply to the same object.
 const IN_PLACE: [&str; 3] = ["allOf", "anyOf", "oneOf"];
 
-/// The key that names a variant has the meaning of the variant.
+/// Describes the key that names a variant with the description of the variant.
 fn describe_tag(variant: &mut Value) {
     let Some(about) = variant.get("description").cloned() else {
         return;
@@ -85,13 +85,13 @@ fn describe_tag(variant: &mut Value) {
     }
 }
 
-/// Allows no other keys in any object; `is_part` is of an object whose other keys stand in the schema around it.
+/// Disallows other keys in all objects; `is_part`: the remaining keys of the object are in the enclosing schema.
 fn close(schema: &mut Value, is_part: bool) {
     let Value::Object(keywords) = schema else {
         return;
     };
     if let Some(Value::String(text)) = keywords.get_mut("description") {
-        // Doc comments have lines.
+        // Doc comments contain line breaks.
         *text = text.replace('\n', " ");
     }
     let has_keys = keywords.contains_key("properties");
@@ -99,7 +99,7 @@ fn close(schema: &mut Value, is_part: bool) {
         .iter()
         .any(|keyword| keywords.contains_key(*keyword));
     if has_keys && !is_part {
-        // Keys in parts count for this keyword alone.
+        // Only this keyword takes the keys in parts into account.
         let keyword = match has_parts {
             true => "unevaluatedProperties",
             false => "additionalProperties",

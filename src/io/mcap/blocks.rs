@@ -69,14 +69,14 @@ impl Spacing {
             let hint = || did_you_mean(name, fields.iter().map(|field| field.name.as_str()));
             let place = place.ok_or_else(|| {
                 format!(
-                    "there is no field \"{name}\"{} for the spacing of samples",
+                    "there is no field \"{name}\"{} for the sample spacing",
                     hint()
                 )
             })?;
             // Any other name given by the user is taken to be a spacing in seconds.
             let (seconds, is_rate) = meaning(name).unwrap_or((1.0, false));
             return Self::field(schema, place, seconds, is_rate)
-                .ok_or_else(|| format!("\"{name}\" is no single number"));
+                .ok_or_else(|| format!("\"{name}\" is not a single number"));
         }
         if !route.is_whole_list() {
             return Ok(Self::Single);

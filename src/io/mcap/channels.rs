@@ -129,7 +129,7 @@ impl TopicChannel {
         let record = &self.record;
         if record.message_encoding == "json" {
             let value = serde_json::from_slice(message)
-                .map_err(|error| format!("its first message is no JSON: {error}"))?;
+                .map_err(|error| format!("its first message is not JSON: {error}"))?;
             let schema = json::read(&value).map_err(|error| error.to_string())?;
             return Ok((Encoding::Json, Arc::new(schema)));
         }

@@ -413,7 +413,7 @@ fn report(channel: &TopicChannel, seen: Option<&ChannelCount>) -> ChannelReport 
     let first = seen.map(|seen| seen.first.as_slice());
     let layout = match (first, record.message_encoding.as_str()) {
         // The structure of JSON messages is only known from a message.
-        (None, "json") => Err("there is no message to tell its fields from".to_owned()),
+        (None, "json") => Err("its fields are unknown without a message".to_owned()),
         (first, _) => channel.layout(first.unwrap_or(&[])),
     };
     let mut report = ChannelReport {

@@ -108,13 +108,13 @@ pub fn parse(text: &str) -> Result<Vec<PathPart>, String> {
                 (None, true) => rest,
                 _ => {
                     return Err(format!(
-                        "\"{text}\" is no field; write it as wrench.torque.z"
+                        "\"{text}\" is not a field; write it as wrench.torque.z"
                     ));
                 }
             };
             let end = name.find(['.', '[']).unwrap_or(name.len());
             if end == 0 {
-                return Err(format!("\"{text}\" is no field: a name is missing in it"));
+                return Err(format!("\"{text}\" is not a field: a name is missing"));
             }
             parts.push(PathPart::Name(name[..end].to_owned()));
             rest = &name[end..];
@@ -157,7 +157,7 @@ fn item(word: &str, text: &str) -> Result<PathPart, String> {
         .unwrap_or(name);
     if name.is_empty() || key.as_deref() == Some("") || word.contains(':') && key.is_none() {
         return Err(format!(
-            "\"[{word}]\" in \"{text}\" is no choice of an item; write [0], [-1], [name=joint], \
+            "\"[{word}]\" in \"{text}\" does not select an item; write [0], [-1], [name=joint], \
              [:] for all or [0::3] for every third"
         ));
     }

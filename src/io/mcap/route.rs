@@ -164,7 +164,7 @@ impl<'a> RouteWalk<'a> {
             PathPart::Index(index) => self.item(place, Hop::Item(*index)),
             PathPart::Slice(slice) => {
                 if self.hops.contains(&Hop::All) {
-                    return Err("only one [:] can be in a field".to_owned());
+                    return Err("a field can have only one [:]".to_owned());
                 }
                 self.slice = *slice;
                 self.item(place, Hop::All)
@@ -205,14 +205,12 @@ impl<'a> RouteWalk<'a> {
     fn item(&mut self, place: usize, hop: Hop) -> Result<(), String> {
         let before = path::text(&self.parts[..place]);
         let FieldKind::Many(many) = &self.kind else {
-            return Err(self.miss(&format!("\"{before}\" is no list")));
+            return Err(self.miss(&format!("\"{before}\" is not a list")));
         };
         if let (Some(count), Hop::Item(index)) = (many.count, hop) {
             let count = i64::from(count);
             if !(-count..count).contains(&index) {
-                return Err(self.miss(&format!(
-                    "\"{before}\" has {count} items, [{index}] is none of them"
-                )));
+                return Err(self.miss(&format!("\"{before}\" has {count} items, but no [{index}]")));
             }
         }
         self.kind = many.item.clone();
@@ -233,7 +231,7 @@ impl<'a> RouteWalk<'a> {
         let Some(hops) = hops else {
             let wanted = key.unwrap_or("name");
             return Err(self.miss(&format!(
-                "there are no texts \"{wanted}\" beside or in \"{}\" to find \"{name}\" in",
+                "there are no texts \"{wanted}\" beside or in \"{}\" in which to find \"{name}\"",
                 path::text(&self.parts[..place])
             )));
         };

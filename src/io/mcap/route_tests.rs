@@ -46,7 +46,7 @@ fn a_miss_lists_what_is_there_and_what_was_meant() {
     assert!(said("header").contains("is not one number"));
     assert!(said("fixed[3]").contains("has 3 items"));
     assert!(said("effort.x").contains("is a list"));
-    assert!(said("header[0]").contains("is no list"));
+    assert!(said("header[0]").contains("is not a list"));
     assert!(said("effort[joint=a]").contains("no texts \"joint\""));
     let text = said("motors[0].torq");
     let listed = text.split("there are: ").nth(1).unwrap();

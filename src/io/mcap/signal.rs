@@ -382,7 +382,7 @@ fn ask_for_item(
     match fields.len() {
         0 | 1 => Ok(()),
         count => Err(format!(
-            "\"{}\" holds {count} items with names of their own; choose one: {}",
+            "\"{}\" has {count} items, each with its own name; choose one: {}",
             route.text,
             fields.join(", ")
         )),

@@ -32,8 +32,8 @@ fn is_matlab_hdf5(head: &[u8]) -> bool {
 fn read(bytes: &mut Bytes, _: &Reading) -> Result<Content, Failure> {
     let head = bytes.take(BEHIND_MATLAB as u64)?;
     let message = if head.starts_with(SQLITE) {
-        "this is an SQLite database, as ROS 2 bags (.db3) are; convert the bag to MCAP with: mcap convert BAG.db3 BAG.mcap, or \
-         with: ros2 bag convert -i BAG -o OUT.yaml (storage_id: mcap)"
+        "this is an SQLite database, like a ROS 2 bag (.db3); convert the bag to MCAP with: mcap convert BAG.db3 \
+         BAG.mcap, or with: ros2 bag convert -i BAG -o OUT.yaml (storage_id: mcap)"
     } else if is_matlab_hdf5(&head) {
         "this is a MATLAB file of version 7.3 (HDF5); save it with the flag -v7 in MATLAB: save('FILE.mat', 'NAME', '-v7')"
     } else {

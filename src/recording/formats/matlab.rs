@@ -144,7 +144,7 @@ fn matrix(bytes: &mut Bytes, order: Order) -> Result<Option<Matrix>, Failure> {
     };
     let Some(number) = number(values.kind) else {
         return Err(damaged(
-            format_args!("the variable \"{name}\" has numbers of an unknown type"),
+            format_args!("the variable \"{name}\" has an unknown number type"),
             values.at,
         ));
     };
@@ -192,7 +192,7 @@ fn read(bytes: &mut Bytes, reading: &Reading) -> Result<Content, Failure> {
             Some(Matrix::Other { name, why }) => left_out.push(format!("\"{name}\" ({why})")),
             Some(Matrix::Numbers(variable)) => variables.push(variable),
             None => {
-                content.lost = Some(cut("a variable is not whole"));
+                content.lost = Some(cut("a variable is incomplete"));
                 break;
             }
         }
@@ -210,7 +210,7 @@ fn inflated(packed: Element, order: Order) -> Result<(u32, Bytes), Failure> {
     match found {
         Ok(Some(found)) if found.is_whole => Ok((found.kind, Bytes::of(found.bytes, packed.at))),
         _ => Err(damaged(
-            "a compressed variable cannot be unpacked",
+            "a compressed variable cannot be decompressed",
             packed.at,
         )),
     }
@@ -372,7 +372,7 @@ fn seconds(time: &Variable, reading: &Reading) -> Result<TimeAxis, Failure> {
     if is_given && known.is_none() {
         return Err(Failure::usage(
             ErrorCode::InvalidValue,
-            "--time-unit is no unit of time; expected s, ms, us or min",
+            "--time-unit is not a unit of time; expected s, ms, us or min",
         ));
     }
     let second = known.as_ref().map_or(1.0, |unit| unit.unit.factor());

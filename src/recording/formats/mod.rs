@@ -87,7 +87,7 @@ pub(super) fn refuse_unit_of_fraction(
     Err(Failure::usage(
         ErrorCode::ConflictingArguments,
         format_args!(
-            "the samples are fractions of full scale, so that {flag} {unit} alone does not say what they are; give full scale \
+            "the samples are fractions of full scale, so {flag} {unit} alone does not define them; give full scale \
              with its unit, as --full-scale \"10 {unit}\""
         ),
     ))
@@ -126,7 +126,7 @@ impl Format {
             return Err(Failure::failed(
                 ErrorCode::NotARecording,
                 format_args!(
-                    "there is no channel with samples in time{why}; export one, as text with a column of time if need be"
+                    "there is no channel with samples over time{why}; export one, if need be as text with a time column"
                 ),
             )
             .at(source));
@@ -216,7 +216,7 @@ fn cut(what: &str) -> Warning {
 fn damaged(what: impl std::fmt::Display, at: u64) -> Failure {
     Failure::failed(
         ErrorCode::DamagedFile,
-        format_args!("{what}; copy the file again, or export it anew"),
+        format_args!("{what}; copy or export the file again"),
     )
     .with(|place| place.byte = Some(at))
 }

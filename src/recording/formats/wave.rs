@@ -73,14 +73,14 @@ impl Layout {
                 return Err(Failure::failed(
                     ErrorCode::NotARecording,
                     format_args!(
-                        "the samples have the WAV format {tag} with {bits} bits, of which no numbers can be made; convert \
+                        "the WAV format {tag} with {bits} bits is not supported; convert \
                          it to PCM (sox IN.wav -e signed -b 24 OUT.wav)"
                     ),
                 ));
             }
         };
         if width * channels != block || plausible_rate(rate_hz).is_none() {
-            return Err(damaged("the chunk \"fmt \" contradicts itself", at));
+            return Err(damaged("the chunk \"fmt \" is inconsistent", at));
         }
         let plural = if channels == 1 { "" } else { "s" };
         Ok(Self {
@@ -112,10 +112,7 @@ fn read(bytes: &mut Bytes, reading: &Reading) -> Result<Content, Failure> {
         let at = bytes.at;
         if id == b"data" {
             let Some(layout) = layout else {
-                return Err(damaged(
-                    "the chunk \"fmt \" does not stand before the data",
-                    at,
-                ));
+                return Err(damaged("no chunk \"fmt \" before the data", at));
             };
             let known = match (size, long) {
                 (UNKNOWN, Some(long)) => Some(long),
@@ -174,9 +171,9 @@ fn data(
     let is_part = stored.len() % layout.frame() != 0;
     if let Some(length) = length.filter(|length| *length > stored.len() as u64) {
         let announced = length / layout.frame() as u64;
-        content.lost = Some(cut(&format!("{frames} of {announced} samples are there")));
+        content.lost = Some(cut(&format!("{frames} of {announced} samples are present")));
     } else if is_part {
-        content.lost = Some(cut("its last sample is not whole"));
+        content.lost = Some(cut("the last sample is incomplete"));
     }
     if reading.full_scale.is_none() {
         content.warnings.push(Warning::new(

@@ -65,17 +65,20 @@ pub(crate) enum ChunkError {
 impl fmt::Display for ChunkError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Head => f.write_str("its front cannot be read"),
+            Self::Head => f.write_str("its header cannot be read"),
             Self::Compression(name) => write!(
                 f,
-                "its compression \"{name}\" is not known; expected \"zstd\", \"lz4\" or none"
+                "unknown compression \"{name}\"; expected \"zstd\", \"lz4\" or none"
             ),
             Self::TooLarge(size) => {
-                write!(f, "it unpacks to {size} bytes, {LARGEST} are read at most")
+                write!(
+                    f,
+                    "it decompresses to {size} bytes, the maximum is {LARGEST}"
+                )
             }
-            Self::Damaged(why) => write!(f, "it cannot be unpacked ({why})"),
+            Self::Damaged(why) => write!(f, "it cannot be decompressed ({why})"),
             Self::Length { told, found } => {
-                write!(f, "it unpacks to {found} bytes instead of {told}")
+                write!(f, "it decompresses to {found} bytes instead of {told}")
             }
             Self::Crc { told, found } => write!(
                 f,

@@ -159,7 +159,7 @@ impl fmt::Display for Loss {
                 };
                 write!(
                     f,
-                    "the record at byte {at} (opcode 0x{op:02x}) says it is {length} bytes long, {rest}"
+                    "the record at byte {at} (opcode 0x{op:02x}) has a declared length of {length} bytes, {rest}"
                 )
             }
             other => other.describe_record(f),

@@ -92,7 +92,8 @@ fn long_metadata_are_left_out_and_named() {
     assert_eq!(losses.count, 1, "{:?}", losses.first);
     let said = losses.first[0].to_string();
     assert!(
-        said.contains("(opcode 0x0c) says it is 671088") && said.contains("--longest-metadata"),
+        said.contains("(opcode 0x0c) has a declared length of 671088")
+            && said.contains("--longest-metadata"),
         "{said}"
     );
 }

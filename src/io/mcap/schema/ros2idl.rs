@@ -248,7 +248,7 @@ impl<'a> Parser<'a, '_> {
                 "short" => Number::U16,
                 "long" if self.skip("long") => Number::U64,
                 "long" => Number::U32,
-                other => return Err(self.error(format_args!("\"unsigned {other}\" is no type"))),
+                other => return Err(self.error(format_args!("\"unsigned {other}\" is not a type"))),
             },
             _ => return Ok(None),
         };
@@ -263,7 +263,8 @@ impl<'a> Parser<'a, '_> {
             let count = word.parse().ok().or_else(|| {
                 lookup(&word, &self.scope, |full| self.declared.constants.get(full)).copied()
             });
-            counts.push(count.ok_or_else(|| self.error(format_args!("\"{word}\" is no length")))?);
+            counts
+                .push(count.ok_or_else(|| self.error(format_args!("\"{word}\" is not a length")))?);
             self.expect("]")?;
             if counts.len() > DEEPEST_LIST {
                 return Err(self.error("too many dimensions"));
@@ -404,10 +405,7 @@ fn kind(declared: &Declared, written: &Written, level: usize) -> Result<FieldKin
         }
         Written::Named(name, scope, line) => {
             if level > DEEPEST_LIST {
-                return Err(SchemaError::at(
-                    *line,
-                    "types refer to each other in a circle",
-                ));
+                return Err(SchemaError::at(*line, "circular type definitions"));
             }
             if let Some(alias) = lookup(name, scope, |full| declared.aliases.get(full)) {
                 return kind(declared, alias, level + 1);

@@ -70,7 +70,7 @@ fn sections<'a>(name: &str, text: &'a str) -> Result<Vec<MessageSection<'a>>, Sc
             let named = line.strip_prefix("MSG:").ok_or_else(|| {
                 SchemaError::at(
                     index + 1,
-                    "expected \"MSG: package/Name\" behind the \"=\" line",
+                    "expected \"MSG: package/Name\" after the \"=\" line",
                 )
             })?;
             sections.push(MessageSection {
@@ -146,7 +146,7 @@ impl Reader {
         }
         let count = bound
             .parse()
-            .map_err(|_| format!("\"{bound}\" is no length of an array"))?;
+            .map_err(|_| format!("\"{bound}\" is not an array length"))?;
         Ok(FieldKind::array(item, count))
     }
 

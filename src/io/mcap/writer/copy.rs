@@ -53,7 +53,7 @@ pub(super) fn copy<W: Write>(
             return Err(Failure::failed(
                 ErrorCode::DamagedFile,
                 format_args!(
-                    "the file ends within the attachment at byte {at}; make it whole first with \"mcap recover\""
+                    "the file ends within the attachment at byte {at}; repair it first with \"mcap recover\""
                 ),
             )
             .at(input.name()));

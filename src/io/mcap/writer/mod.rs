@@ -77,7 +77,7 @@ impl<W: Write> Writer<W> {
             return Err(Failure::failed(
                 ErrorCode::OutputExists,
                 format_args!(
-                    "there is a topic \"{}\" in it already; name another one for the result",
+                    "the topic \"{}\" already exists; choose another one for the result",
                     added.topic
                 ),
             )
@@ -90,7 +90,7 @@ impl<W: Write> Writer<W> {
             .ok_or_else(|| {
                 Failure::failed(
                     ErrorCode::CannotWrite,
-                    "the file has no number left for another channel",
+                    "no channel number is left in the file",
                 )
             })?;
         Ok(Self {

@@ -231,5 +231,5 @@ fn a_topic_that_is_taken_is_refused() {
         ..added(Encoding::Cdr)
     };
     let said = Writer::copying(&Input::File(path), Vec::new(), "out", &added);
-    assert!(said.err().unwrap().to_string().contains("name another"));
+    assert!(said.err().unwrap().to_string().contains("choose another"));
 }

@@ -87,7 +87,7 @@ pub(super) fn channels(
         }
         let name = one.name();
         if one.is_times() {
-            left_out.push(format!("\"{name}\" (times of no other channel)"));
+            left_out.push(format!("\"{name}\" (time stamps of no other channel)"));
             continue;
         }
         content.warnings.extend(doubts(&one.object, &name));
@@ -262,7 +262,7 @@ fn of_times(times: &ScaledChannel, reading: &Reading) -> Result<TimeAxis, Failur
         Some(given) => Some(known(given).ok_or_else(|| {
             Failure::usage(
                 ErrorCode::InvalidValue,
-                "--time-unit is no unit of time; expected s, ms, us or min",
+                "--time-unit is not a unit of time; expected s, ms, us or min",
             )
         })?),
         None => {

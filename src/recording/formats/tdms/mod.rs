@@ -94,7 +94,7 @@ fn read(bytes: &mut Bytes, reading: &Reading) -> Result<Content, Failure> {
             // What precedes is complete.
             Err(failure) if file.has_samples() => {
                 let message = format!(
-                    "segment {} and what lies behind it are lost: {failure}",
+                    "segment {} and everything after it are lost: {failure}",
                     file.segments
                 );
                 content.lost = Some(Warning::new("segment-damaged", message));
@@ -153,14 +153,14 @@ impl TdmsFile {
             return Err(Failure::failed(
                 ErrorCode::NotARecording,
                 format_args!(
-                    "the TDMS version is {}, where 4712 or 4713 is expected; save it as TDMS 2.0 in LabVIEW",
+                    "TDMS version {}, expected 4712 or 4713; save it as TDMS 2.0 in LabVIEW",
                     self.version
                 ),
             ));
         }
         if metadata > length {
             return Err(damaged(
-                "the metadata of a segment are longer than it",
+                "the metadata of a segment are longer than the segment",
                 bytes.at,
             ));
         }
@@ -227,7 +227,7 @@ impl TdmsFile {
         let sizes = self.chunk.parts.iter().map(RawRows::size);
         let size = sizes.fold(0, u64::saturating_add);
         if size == 0 {
-            let what = "a segment has data, but no channel that they belong to";
+            let what = "a segment has data, but no channel for them";
             return Err(damaged(what, bytes.at));
         }
         let mut left = length.unwrap_or(OPEN);
@@ -245,7 +245,7 @@ impl TdmsFile {
                 };
                 if !part.read(bytes, count, &mut self.objects, order)? {
                     let open = match length {
-                        None => ", which was not closed: what is whole was read",
+                        None => ", which was not closed: complete samples were read",
                         Some(_) => "",
                     };
                     let place = format!("within the data of segment {}{open}", self.segments);
@@ -373,7 +373,7 @@ fn laid_out(
     let is_mixed = chunk.is_daqmx && (has_values || has_others);
     if is_mixed || is_interleaved && has_others && places.len() > 1 {
         let what =
-            "a segment has DAQmx raw data, or text among interleaved numbers, beside other data";
+            "a segment mixes DAQmx raw data, or text among interleaved numbers, with other data";
         return Err(damaged(what, at));
     }
     chunk.parts.retain(|part| part.size() > 0);
@@ -431,7 +431,7 @@ impl ChunkLayout {
             let part = self.parts.get_mut(scaler.buffer);
             let part = part.filter(|part| end <= part.width && widths.len() > scaler.buffer);
             let Some(part) = part else {
-                let what = "a DAQmx scaler does not lie in its raw data";
+                let what = "a DAQmx scaler is outside its raw data";
                 return Err(damaged(what, at));
             };
             part.count = part.count.max(count);

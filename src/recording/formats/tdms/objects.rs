@@ -249,7 +249,7 @@ impl<'a> MetadataFields<'a> {
             .and_then(|count| self.bytes.split_at_checked(count));
         let Some((taken, rest)) = taken else {
             return Err(damaged(
-                "the metadata of a segment are longer than it says",
+                "the metadata of a segment exceed their declared length",
                 self.at,
             ));
         };
@@ -303,7 +303,7 @@ impl<'a> MetadataFields<'a> {
             NO_DATA => return Ok(()),
             AS_BEFORE if object.index.is_some() => return Ok(()),
             AS_BEFORE => {
-                let what = "a channel refers to an index that does not stand before";
+                let what = "a channel refers to a previous index that does not exist";
                 return Err(damaged(what, at));
             }
             DAQMX | DAQMX_DIGITAL | DAQMX_DIGITAL_DOCUMENTED => self.daqmx(kind != DAQMX)?,
@@ -325,7 +325,7 @@ impl<'a> MetadataFields<'a> {
             return Err(Failure::failed(
                 ErrorCode::NotARecording,
                 format_args!(
-                    "a channel has data of the type {kind:#x}{}, of which no numbers can be made; save it as DBL in LabVIEW",
+                    "data type {kind:#x}{} of a channel is not supported; save it as DBL in LabVIEW",
                     match kind {
                         0x0b | 0x1b => " (extended precision)",
                         0x4f => " (fixed point)",
@@ -350,7 +350,7 @@ impl<'a> MetadataFields<'a> {
         match self.u32()? {
             1 => Ok(()),
             other => Err(damaged(
-                format_args!("a channel has {other} dimensions in place of 1"),
+                format_args!("a channel has {other} dimensions, expected 1"),
                 at,
             )),
         }

@@ -81,7 +81,7 @@ pub(super) fn scaled(
         return match series.len() {
             0 => Ok(Vec::new()),
             1 => Ok(series.swap_remove(0).values),
-            _ => Err("DAQmx raw data without the scales that join them".to_owned()),
+            _ => Err("DAQmx raw data without the scales that combine them".to_owned()),
         };
     };
     if series.is_empty() {
@@ -126,7 +126,7 @@ fn chain(
 ) -> Result<Vec<ChannelScale>, String> {
     // Each has a property or a scaler.
     if count > (properties.len() + series.len()) as f64 {
-        return Err(format!("{count} scales are announced, but not there"));
+        return Err(format!("{count} scales are declared, but missing"));
     }
     let count = count as usize;
     let mut scales: Vec<ChannelScale> = Vec::new();
@@ -144,7 +144,7 @@ fn chain(
                     return Err(format!("scale {number} takes its input from scale {other}"));
                 }
                 ScaleSource::Stored if !series.iter().any(|s| s.scale_id == RAW) => {
-                    return Err(format!("scale {number} takes DAQmx raw data for values"));
+                    return Err(format!("scale {number} takes DAQmx raw data as values"));
                 }
                 ScaleSource::Stored => {}
             }
@@ -226,7 +226,7 @@ impl ScaleKeys<'_> {
             "Thermistor" => ChannelScale::Thermistor(source, self.thermistor()?),
             other => {
                 return Err(format!(
-                    "its scale \"{other}\" is not known to torqcomp; export it as text or with npTDMS"
+                    "its scale \"{other}\" is not supported; export it as text or with npTDMS"
                 ));
             }
         })
@@ -243,7 +243,7 @@ impl ScaleKeys<'_> {
         let is_rising = pairs.windows(2).all(|pair| pair[0][0] < pair[1][0]);
         if inputs.len() != outputs.len() || pairs.is_empty() || !is_rising {
             return Err(format!(
-                "scale {}: the inputs of its table neither rise nor fall, or have not an output each",
+                "scale {}: the inputs of its table are not monotonic, or differ in number from the outputs",
                 self.number
             ));
         }
@@ -263,7 +263,7 @@ impl ScaleKeys<'_> {
             10_188 => (4.0, both, 2.0 * other, true),
             10_189 => (2.0, 1.0, 0.0, true),
             10_271 | 10_272 => (4.0, 1.0, 2.0, true),
-            _ => return Err(format!("a strain gage configuration {code} is not known")),
+            _ => return Err(format!("unknown strain gage configuration {code}")),
         };
         let leads = match has_leads {
             true => 1.0 + f64("Lead_Wire_Resistance")? / f64("Gage_Resistance")?,
@@ -304,7 +304,7 @@ impl ScaleKeys<'_> {
     fn thermistor(&self) -> Result<Thermistor, String> {
         let kind = self.f64("Thermistor_Excitation_Type")?;
         if kind != BY_CURRENT && kind != BY_VOLTAGE {
-            return Err(format!("an excitation {kind} of a thermistor is not known"));
+            return Err(format!("unknown thermistor excitation {kind}"));
         }
         let is_by_current = kind == BY_CURRENT;
         Ok(Thermistor {

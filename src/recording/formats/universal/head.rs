@@ -74,9 +74,8 @@ impl Head {
             ))
         };
         let Some((kind, count, spacing, start, step)) = known() else {
-            return Err(lines.wrong(
-                "the seventh line of a data set 58 has not the numbers that it should have",
-            ));
+            return Err(lines
+                .wrong("the seventh line of a data set 58 does not contain the required numbers"));
         };
         let [abscissa, ordinate] = [&head[7], &head[8]].map(|line| Axis::of(line));
         Ok(Some(Self {
@@ -108,9 +107,9 @@ impl Head {
             self.axes[0].kind == TIME || (self.axes[0].kind == 0 && self.function == 1);
         match self.kind {
             5 | 6 => Some("complex numbers"),
-            2 | 4 if !is_over_time => Some("no function of time"),
+            2 | 4 if !is_over_time => Some("not a function of time"),
             2 | 4 => None,
-            _ => Some("numbers of an unknown kind"),
+            _ => Some("unknown number type"),
         }
     }
 

@@ -100,21 +100,19 @@ fn storage(line: &str, lines: &Lines) -> Result<Storage, Failure> {
         Some(1) => Order::Little,
         Some(2) => Order::Big,
         _ => {
-            return Err(
-                lines.wrong("the data set 58b does not say the order of its bytes (1 or 2)")
-            );
+            return Err(lines.wrong("the data set 58b does not give its byte order (1 or 2)"));
         }
     };
     if field(line, 13, 6) != Some(2) {
         return Err(Failure::failed(
             ErrorCode::NotARecording,
-            "the data set 58b has floating point of DEC VMS or IBM, which torqcomp does not read; write it as IEEE 754",
+            "the data set 58b has DEC VMS or IBM floating-point numbers, which are not supported; write it as IEEE 754",
         )
         .line(lines.number));
     }
     let count = field(line, 31, 12);
     let count =
-        count.ok_or_else(|| lines.wrong("the data set 58b does not say how many bytes it has"))?;
+        count.ok_or_else(|| lines.wrong("the data set 58b does not give its number of bytes"))?;
     Ok(Storage::Binary(order, count))
 }
 
@@ -142,7 +140,7 @@ fn data_set(
             let is_whole = stored.len() == count;
             let needed = wanted.saturating_mul(head.width().width());
             if is_whole && count < needed && foreign.is_none() {
-                return Err(lines.wrong("the data set 58b has fewer bytes than its numbers take"));
+                return Err(lines.wrong("the data set 58b has fewer bytes than its numbers need"));
             }
             while is_whole && lines.next()?.is_some_and(|line| line.trim() != "-1") {}
             (head.width().all(&stored, order), is_whole)
@@ -187,7 +185,7 @@ fn text_values(lines: &mut Lines, wanted: usize, head: &Head) -> Result<Vec<f64>
         if !numbers_of(&line, widths, &mut values) {
             return Err(Failure::failed(
                 ErrorCode::InvalidSample,
-                "the line has a text where numbers of a data set 58 are expected; correct it",
+                "text where numbers of a data set 58 are expected; correct the line",
             )
             .line(lines.number));
         }
@@ -218,7 +216,7 @@ fn made(head: &Head, name: &str, values: &[f64], lines: &Lines) -> Result<Channe
     let (axis, samples) = if head.is_even {
         let step = head.step * second;
         if !(step > 0.0 && step.is_finite() && head.start.is_finite()) {
-            return Err(lines.wrong("the step of the abscissa is not a time greater than zero"));
+            return Err(lines.wrong("the abscissa increment is not a positive time"));
         }
         let start = head.start * second;
         let rate_hz = roundest_rate(step);

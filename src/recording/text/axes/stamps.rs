@@ -302,7 +302,7 @@ impl Sources<'_> {
             if !units::is_time(&named) {
                 return Err(Failure::usage(
                     ErrorCode::InvalidValue,
-                    format_args!("--time-unit {text} is no unit of time"),
+                    format_args!("--time-unit {text} is not a unit of time"),
                 ));
             }
             return Ok(Some((unit.factor(), None)));

@@ -85,7 +85,7 @@ fn errors_name_the_line() {
         "line 2 of its definition: the type \"NoSuch\" is not defined"
     );
     assert!(said("float64").contains("line 1"));
-    assert!(said("float64[x] y").contains("no length"));
+    assert!(said("float64[x] y").contains("not an array length"));
     assert!(said("p/M again").contains("contains itself"));
     assert!(said(&format!("int8 a\n{}\nfloat64 x", "=".repeat(80))).contains("line 3"));
 }
