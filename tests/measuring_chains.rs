@@ -634,7 +634,7 @@ fn init_writes_a_stand_file_that_converts() {
     );
     let ran = folder.run(&["init", "--from", "bridge", "--layout", "full"]);
     assert!(
-        ran.code == 2 && ran.stderr.contains("--layout does not belong"),
+        ran.code == 2 && ran.stderr.contains("--layout does not apply"),
         "{}",
         ran.stderr
     );
