@@ -69,10 +69,9 @@ fn is_tied(tried: &[CandidateFit], k: usize, best: usize) -> bool {
 /// Whether the records do not determine a parameter that cannot be zero, such as the frequency of a mode: the effect then
 /// imitates another.
 fn is_undetermined(candidate: &CandidateFit) -> bool {
-    let forms = candidate.effect.forms.iter();
-    let form = forms
-        .into_iter()
-        .find(|form| Some(form.name) == candidate.form);
+    let form = candidate
+        .form
+        .and_then(|name| candidate.effect.form(Some(name)));
     let pairs = form.map(|form| form.parameters.iter().zip(&candidate.parameters));
     pairs.into_iter().flatten().any(|(of, found)| {
         let estimate = &found.estimate;

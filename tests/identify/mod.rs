@@ -8,6 +8,7 @@ mod response;
 mod runup;
 mod short_hits;
 mod static_load;
+mod transients;
 mod traps;
 mod trials;
 

@@ -78,6 +78,25 @@ fn a_zero_far_from_nothing_changes_no_uncertainty() {
     }
 }
 
+/// Loads in N m, readings in V.
+fn units() -> LoadUnits {
+    LoadUnits {
+        load: "N m".to_owned(),
+        reading: "V".to_owned(),
+    }
+}
+
+/// A reading without a known uncertainty, at one mounting.
+fn point(load: f64, reading: f64, series: usize) -> Point {
+    Point {
+        load,
+        reading,
+        std: None,
+        series,
+        position: 0,
+    }
+}
+
 /// Three series of eleven loads up and ten down; readings 0.02 V + 0.1 V/(N m) times the load, with
 /// noise `decibel` below the largest, constant or growing with the load (and then known).
 fn points(decibel: f64, known: bool, noise: &mut Noise) -> Vec<Point> {
@@ -109,10 +128,7 @@ fn points(decibel: f64, known: bool, noise: &mut Noise) -> Vec<Point> {
 
 #[test]
 fn intervals_of_known_loads_cover_the_truth() {
-    let units = LoadUnits {
-        load: "N m".to_owned(),
-        reading: "V".to_owned(),
-    };
+    let units = units();
     for known in [false, true] {
         let mut noise = Noise(31);
         let names = [
@@ -165,26 +181,17 @@ fn the_last_digit_of_a_display_is_part_of_the_uncertainty() {
 /// noise of the reading at least, may not enlarge the walk.
 #[test]
 fn the_last_digit_enlarges_no_drift() {
-    let units = LoadUnits {
-        load: "N m".to_owned(),
-        reading: "V".to_owned(),
-    };
+    let units = units();
     let mut noise = Noise(8);
     // 0.2 mV over the root of Σ(x − x̄)² = 70 N² m².
     let plain = 2e-4 / 70.0_f64.sqrt();
     for _ in 0..100 {
-        let point = |k: usize| {
+        let row = |k: usize| {
             let load = 2.0 * k as f64;
             let reading = 0.01 + 0.1 * load + 2e-4 * noise.normal();
-            Point {
-                load,
-                reading: (reading * 1e6).round() / 1e6,
-                std: None,
-                series: 0,
-                position: 0,
-            }
+            point(load, (reading * 1e6).round() / 1e6, 0)
         };
-        let points: Vec<Point> = (0..6).map(point).collect();
+        let points: Vec<Point> = (0..6).map(row).collect();
         let found = identify(&points, 1, &units).unwrap();
         let std = of(&found, "sensitivity").std().unwrap();
         assert!(std < 10.0 * plain, "{std} is much more than {plain}");
@@ -289,10 +296,7 @@ fn logged(rows: usize, noise: &mut Noise) -> Vec<Point> {
 /// Ten times the rows, with ten times the series, take about ten times as long, not a hundred or a thousand times.
 #[test]
 fn time_grows_in_proportion_to_the_rows() {
-    let units = LoadUnits {
-        load: "N m".to_owned(),
-        reading: "V".to_owned(),
-    };
+    let units = units();
     let mut noise = Noise(5);
     let tables = [2_000, 20_000].map(|rows| logged(rows, &mut noise));
     let seconds = |points: &[Point], times: usize| {
@@ -312,10 +316,7 @@ fn time_grows_in_proportion_to_the_rows() {
 /// Readings repeated at a load belong to the direction in which it was reached, as does a load that scatters.
 #[test]
 fn the_hysteresis_of_repeated_readings_is_found() {
-    let units = LoadUnits {
-        load: "N m".to_owned(),
-        reading: "V".to_owned(),
-    };
+    let units = units();
     let mut noise = Noise(6);
     let mut points = logged(200, &mut noise);
     for point in &mut points {
@@ -337,13 +338,7 @@ fn staircase(rows: usize, lag: impl Fn(usize) -> f64, noise: &mut Noise) -> Vec<
         let before = if step == 0 { *load } else { loads[step - 1] };
         for row in 0..rows {
             let shown = load + (before - load) * lag(row);
-            points.push(Point {
-                load: *load,
-                reading: 0.1 + 0.02 * shown + 5e-4 * noise.normal(),
-                std: None,
-                series: 0,
-                position: 0,
-            });
+            points.push(point(*load, 0.1 + 0.02 * shown + 5e-4 * noise.normal(), 0));
         }
     }
     points
@@ -351,10 +346,7 @@ fn staircase(rows: usize, lag: impl Fn(usize) -> f64, noise: &mut Noise) -> Vec<
 
 #[test]
 fn readings_that_still_settle_are_left_out() {
-    let units = LoadUnits {
-        load: "N m".to_owned(),
-        reading: "V".to_owned(),
-    };
+    let units = units();
     let mut noise = Noise(22);
     let settling = |row: usize| (-0.2 * row as f64).exp();
     for (is_settling, rows) in [(true, 200), (true, 60), (false, 200), (false, 4)] {
@@ -378,10 +370,7 @@ fn readings_that_still_settle_are_left_out() {
 
 #[test]
 fn a_sorted_table_shows_no_drift() {
-    let units = LoadUnits {
-        load: "N m".to_owned(),
-        reading: "V".to_owned(),
-    };
+    let units = units();
     let mut noise = Noise(23);
     for _ in 0..20 {
         let mut points = staircase(3, |_| 0.0, &mut noise);
@@ -409,10 +398,7 @@ fn a_sorted_table_shows_no_drift() {
 /// Readings of two decimals repeat exactly; their rounding is no curve.
 #[test]
 fn rounding_is_no_curve() {
-    let units = LoadUnits {
-        load: "N m".to_owned(),
-        reading: "V".to_owned(),
-    };
+    let units = units();
     let mut points = staircase(3, |_| 0.0, &mut Noise(24));
     for point in &mut points {
         point.reading = ((0.1 + 0.0196 * point.load) * 100.0).round() / 100.0;
@@ -428,10 +414,7 @@ fn rounding_is_no_curve() {
 /// A lens of 1 % between loading and unloading, closed at both ends.
 #[test]
 fn a_zero_that_the_curve_misses_is_uncertain_by_that() {
-    let units = LoadUnits {
-        load: "N m".to_owned(),
-        reading: "V".to_owned(),
-    };
+    let units = units();
     let mut noise = Noise(25);
     for lens in [0.0, 5e-4, 5e-3] {
         let (mut points, mut outside) = (Vec::new(), 0);
@@ -444,12 +427,9 @@ fn a_zero_that_the_curve_misses_is_uncertain_by_that() {
                     let side = if k < 6 { 0.0 } else { 1.0 };
                     (load, 0.5 * lens * side * 4.0 * part * (1.0 - part))
                 };
-                points.extend((0..11).map(shape).map(|(load, more)| Point {
-                    load,
-                    reading: 0.1 + 0.02 * load + more + 1e-4 * noise.normal(),
-                    std: None,
-                    series,
-                    position: 0,
+                points.extend((0..11).map(shape).map(|(load, more)| {
+                    let reading = 0.1 + 0.02 * load + more + 1e-4 * noise.normal();
+                    point(load, reading, series)
                 }));
             }
             let found = identify(&points, 1, &units).unwrap();

@@ -51,9 +51,7 @@ pub fn decays(samples: &[f64]) -> Vec<Range<usize>> {
         return found.ranges;
     }
     // No hit was found, which noise may have hidden.
-    let factor = samples_in_mean(samples);
-    let chunks = samples.chunks_exact(factor);
-    let means: Vec<f64> = chunks.map(mean).collect();
+    let (factor, means) = peaks::averaged(samples, A_PERIOD);
     let of_means = Onsets::of(&means);
     if factor == 1 || of_means.rings_first || of_means.ranges.is_empty() {
         return found.ranges;
@@ -70,16 +68,6 @@ pub fn decays(samples: &[f64]) -> Vec<Range<usize>> {
 
 fn mean(samples: &[f64]) -> f64 {
     samples.iter().sum::<f64>() / samples.len().max(1) as f64
-}
-
-/// Samples in a sixth of a period of the strongest line.
-fn samples_in_mean(samples: &[f64]) -> usize {
-    let middle = mean(samples);
-    let about: Vec<f64> = samples.iter().map(|v| v - middle).collect();
-    let lowest = 2.0 / samples.len() as f64;
-    let line = peaks::strongest(&about, 1.0, lowest, 0.5);
-    line.map_or(1, |peak| (1.0 / (A_PERIOD * peak.frequency_hz)) as usize)
-        .max(1)
 }
 
 /// Stretches of free ringing by the swing of blocks.

@@ -1,5 +1,6 @@
 //! Strongest spectral line of a record, as a start value for a fit.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// A peak of a power spectrum.
@@ -157,6 +158,30 @@ pub fn briefest(lines: &[Line]) -> Option<usize> {
         !longer.any(|other| line.is_in(other))
     };
     lines.iter().filter(is_new).map(|line| line.over).min()
+}
+
+/// Means of neighbouring samples, about `per_period` of them in a period of the strongest line, and the number of samples
+/// in each.
+///
+/// ```
+/// // 60 samples a period: with 20 means a period, each is of 3 samples.
+/// let record: Vec<f64> = (0..600).map(|i| (std::f64::consts::TAU * f64::from(i) / 60.0).sin()).collect();
+/// let (factor, means) = torqcomp_dsp::peaks::averaged(&record, 19.5);
+/// assert_eq!((factor, means.len()), (3, 200));
+/// assert!((means[0] - (record[0] + record[1] + record[2]) / 3.0).abs() < 1e-15);
+/// ```
+#[must_use]
+pub fn averaged(samples: &[f64], per_period: f64) -> (usize, Cow<'_, [f64]>) {
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+    let middle = mean(samples);
+    let about: Vec<f64> = looked_at(samples).iter().map(|v| v - middle).collect();
+    // In cycles per sample, from two periods in the record on.
+    let lowest = 2.0 / samples.len() as f64;
+    let line = strongest(&about, 1.0, lowest, 0.5).map_or(0.5, |peak| peak.frequency_hz);
+    match (1.0 / (per_period * line)) as usize {
+        0 | 1 => (1, samples.into()),
+        factor => (factor, samples.chunks_exact(factor).map(mean).collect()),
+    }
 }
 
 /// Samples without their mean, windowed.

@@ -5,7 +5,6 @@
 //! with the amplitude. A jump of the residual marks a restart. Samples are first averaged to about [`A_PERIOD`] per
 //! period of the strongest line: means of decaying sines are decaying sines.
 
-use std::borrow::Cow;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
@@ -36,11 +35,7 @@ const RIDGE: f64 = 1e-12;
 /// The parts of a segment, in samples: the whole, or those before and after each restart that ring and have at least
 /// `least` samples.
 pub(super) fn parts(values: &[f64], least: usize) -> Vec<Range<usize>> {
-    let factor = averaged(values);
-    let few: Cow<[f64]> = match factor {
-        1 => values.into(),
-        _ => values.chunks_exact(factor).map(mean).collect(),
-    };
+    let (factor, few) = peaks::averaged(values, A_PERIOD);
     let mut all = Vec::new();
     let mut from = 0;
     for gap in restarts(&few) {
@@ -58,11 +53,7 @@ pub(super) fn parts(values: &[f64], least: usize) -> Vec<Range<usize>> {
 /// Number of samples at the start of a segment before the decay begins, as with a preload released a little later: the
 /// recursion fails until the last of them has passed, and holds from then on.
 pub(super) fn lead(values: &[f64]) -> usize {
-    let factor = averaged(values);
-    let few: Cow<[f64]> = match factor {
-        1 => values.into(),
-        _ => values.chunks_exact(factor).map(mean).collect(),
-    };
+    let (factor, few) = peaks::averaged(values, A_PERIOD);
     let Some((left, noise)) = unpredicted(&few, LEAD).map(with_noise) else {
         return 0;
     };
@@ -85,26 +76,11 @@ fn with_noise(left: Vec<f64>) -> (Vec<f64>, f64) {
     (left, noise)
 }
 
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
 /// Half the peak-to-peak value.
 fn swing(values: &[f64]) -> f64 {
     let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let low = values.iter().copied().fold(f64::INFINITY, f64::min);
     0.5 * (high - low).max(0.0)
-}
-
-/// Number of samples per average.
-fn averaged(values: &[f64]) -> usize {
-    let middle = mean(values);
-    let about = peaks::looked_at(values).iter().map(|v| v - middle);
-    let about: Vec<f64> = about.collect();
-    // In cycles per sample, from two periods in the segment on.
-    let lowest = 2.0 / values.len() as f64;
-    let line = peaks::strongest(&about, 1.0, lowest, 0.5).map_or(0.5, |peak| peak.frequency_hz);
-    ((1.0 / (A_PERIOD * line)) as usize).max(1)
 }
 
 /// Ranges from each restart to where the recursion holds again.

@@ -68,10 +68,16 @@ fn last_answered(set: &Set, coherence: &[f64]) -> usize {
         return 0;
     }
     let lines = coherence.len();
-    let power = |k: usize| -> f64 { set.blocks.iter().map(|b| b.measured[k].norm_sqr()).sum() };
+    let power = |k: usize| measured_power(set, k);
     let top = (1..lines).map(power).fold(0.0, f64::max);
     let is_answered = |k: &usize| power(*k) > EXCITES * top && coherence[*k] > COHERENT;
     (1..lines).rev().find(is_answered).unwrap_or(0)
+}
+
+/// Power of the measured signal at a line, summed over the blocks.
+fn measured_power(set: &Set, line: usize) -> f64 {
+    let blocks = set.blocks.iter();
+    blocks.map(|block| block.measured[line].norm_sqr()).sum()
 }
 
 /// Maximum number of fitted lines.
@@ -82,8 +88,7 @@ const SUGGESTED: usize = 5800;
 
 /// The band of [`SUGGESTED`] lines in which the measured signal has most power.
 pub(super) fn strongest(set: &Set, lines: &Lines) -> (usize, usize) {
-    let power = |k: usize| -> f64 { set.blocks.iter().map(|b| b.measured[k].norm_sqr()).sum() };
-    let powers: Vec<f64> = lines.clone().map(power).collect();
+    let powers: Vec<f64> = lines.clone().map(|k| measured_power(set, k)).collect();
     let mut sum: f64 = powers[..SUGGESTED].iter().sum();
     let mut best = (sum, 0);
     for from in 1..=powers.len() - SUGGESTED {

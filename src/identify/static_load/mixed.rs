@@ -93,11 +93,11 @@ pub(super) fn fit(
     // From −½ to ½, so that the zero is that of the middle row.
     let row = |i: usize| (i as f64 + 0.5) / points.len() as f64 - 0.5;
     let drift: Vec<f64> = (0..points.len()).map(row).collect();
-    let mut has_even_drift = model.has_order && model.is_apart(&drift);
+    let mut has_even_drift = !steps.is_sorted && model.is_apart(&drift);
     let mut ratios = None;
     if has_even_drift {
         let next = Mixed::of(points, degree, largest, std::slice::from_ref(&drift));
-        let of_model = model.best_ratios();
+        let of_model = model.best_ratios(steps);
         has_even_drift = next.is_better(&model, of_model);
         if has_even_drift {
             (columns, model) = (vec![drift], next);
@@ -105,7 +105,7 @@ pub(super) fn fit(
             ratios = Some(of_model);
         }
     }
-    let mut ratios = ratios.unwrap_or_else(|| model.best_ratios());
+    let mut ratios = ratios.unwrap_or_else(|| model.best_ratios(steps));
     let mut loops = hysteresis(points.len(), steps);
     let mut has_hysteresis = !loops.is_empty();
     if has_hysteresis {
@@ -114,7 +114,7 @@ pub(super) fn fit(
         has_hysteresis = next.is_better(&model, ratios);
         if has_hysteresis {
             model = next;
-            ratios = model.best_ratios();
+            ratios = model.best_ratios(steps);
         }
     }
     let mut found = model.fit(degree, ratios)?;
@@ -225,7 +225,6 @@ impl Mixed {
             mountings: self.mountings.clone(),
             variances: vec![1.0; column.len()],
             is_known: false,
-            has_order: self.has_order,
         };
         let mean = column.iter().sum::<f64>() / column.len() as f64;
         let all: f64 = column.iter().map(|v| (v - mean).powi(2)).sum();
@@ -323,7 +322,7 @@ impl Mixed {
     }
 
     /// The variances that maximise the restricted likelihood, by coordinate search with decreasing steps.
-    fn best_ratios(&self) -> VarianceRatios {
+    fn best_ratios(&self, steps: &LoadSteps) -> VarianceRatios {
         let mut best = [0.0; 3];
         let Some(plain) = self.solve(best) else {
             return best;
@@ -341,7 +340,7 @@ impl Mixed {
             .collect();
         let mut least = plain.deviance;
         let is_open = [
-            self.has_order,
+            !steps.is_sorted,
             self.series.count() > 0,
             self.mountings.count() > 0,
         ];

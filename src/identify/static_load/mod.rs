@@ -145,14 +145,13 @@ pub fn identify(
     groups::refuse_mixed(points)?;
     linear::refuse_two_ranges(points, &steps)?;
     let mut fit = mixed::fit(points, degree, &steps)?;
-    zero::walking(&mut fit, points, largest);
-    zero::off(&mut fit, points, largest);
+    zero::limit_std(&mut fit, points, largest);
     follows(points, &fit, largest)?;
     let unscale = |(k, v): (usize, &f64)| v / largest.powi(k as i32);
     let curve: Vec<f64> = fit.values.iter().enumerate().map(unscale).collect();
     let mut result = Identification::new("static");
     rows::warn_unsettled(&mut result, unsettled);
-    if rows::is_sorted(points) {
+    if steps.is_sorted {
         rows::warn_sorted(&mut result);
     }
     result.parameters = constants(&fit, largest, units);

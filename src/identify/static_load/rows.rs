@@ -1,6 +1,8 @@
 //! Rows that are not settled readings in order of time: sorted tables, and data loggers whose reading still settles after each
 //! change of the load.
 
+use std::borrow::Cow;
+
 use super::Point;
 use super::steps::is_same_load;
 use crate::identify::{Identification, rms};
@@ -47,7 +49,7 @@ pub(super) fn warn_sorted(result: &mut Identification) {
 }
 
 /// The settled points, and the number of those in which the reading still settles after a change of the load.
-pub(super) fn settled(points: &[Point]) -> (Vec<Point>, usize) {
+pub(super) fn settled(points: &[Point]) -> (Cow<'_, [Point]>, usize) {
     let runs: Vec<LoadRun> = runs(points).map(LoadRun::of).collect();
     let lags: Vec<usize> = std::iter::once(0)
         .chain(
@@ -61,10 +63,10 @@ pub(super) fn settled(points: &[Point]) -> (Vec<Point>, usize) {
     let at_loads = long().map(|run| run.points.len()).sum::<usize>() as f64;
     let is_stepwise = at_loads > STEPWISE * points.len() as f64;
     if lagging < LOADS || 2 * lagging < long().count() || !is_stepwise {
-        return (points.to_vec(), 0);
+        return (points.into(), 0);
     }
     let kept = runs.iter().zip(&lags);
-    let kept = kept.flat_map(|(run, rows)| run.points[*rows..].to_vec());
+    let kept = kept.flat_map(|(run, rows)| run.points[*rows..].iter().copied());
     (kept.collect(), lags.iter().sum())
 }
 

@@ -5,7 +5,6 @@ use nalgebra::{DMatrix, DVector};
 use super::Point;
 use super::filter::LevelFilter;
 use super::groups::Groups;
-use super::rows;
 
 /// Variances of drift, zeros and sensitivities, relative to that of a reading.
 pub(super) type VarianceRatios = [f64; 3];
@@ -22,8 +21,6 @@ pub(super) struct Mixed {
     /// Variance of each reading, known or 1.
     pub variances: Vec<f64>,
     pub is_known: bool,
-    /// Whether the rows are in the order in which they were taken, so that the zero may drift over them.
-    pub has_order: bool,
 }
 
 /// The model solved for given variances.
@@ -62,7 +59,6 @@ impl Mixed {
             variances: points.iter().map(variance).collect(),
             loads,
             is_known,
-            has_order: !rows::is_sorted(points),
         }
     }
 

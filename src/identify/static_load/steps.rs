@@ -1,6 +1,6 @@
 //! Load steps of a table: the rows of each, and whether they were reached by loading or unloading.
 
-use super::{Point, SAME};
+use super::{Point, SAME, rows};
 
 /// The different loads of a table with their rows.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +13,8 @@ pub(super) struct LoadSteps {
     pub is_rising: Vec<bool>,
     /// Largest magnitude of the loads.
     pub largest: f64,
+    /// Whether the rows are sorted, so that their order in time is lost.
+    pub is_sorted: bool,
 }
 
 impl LoadSteps {
@@ -27,6 +29,7 @@ impl LoadSteps {
             is_rising: directions(points, largest),
             loads,
             largest,
+            is_sorted: rows::is_sorted(points),
         }
     }
 

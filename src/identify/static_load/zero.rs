@@ -6,38 +6,31 @@ use crate::identify::{Identification, rms};
 use crate::print::{self, rounded};
 use crate::student::student;
 
-/// Limits the uncertainty of a randomly drifting zero from below by that of the mean of its readings, as it is known
-/// only while it is read.
-pub(super) fn walking(fit: &mut LoadCurve, points: &[Point], largest: f64) {
-    let Some(std) = fit.std[0].filter(|_| fit.spreads.drift > 0.0) else {
+/// Standard uncertainties beyond which the zero of the curve contradicts the readings without load.
+const CONTRADICTS: f64 = 2.0;
+
+/// Limits the uncertainty of the zero from below by what the readings without load show: that of their mean if the zero
+/// drifts randomly, as it is known only while it is read, and their difference from the curve if they contradict it, as
+/// with a hysteresis that closes without load.
+pub(super) fn limit_std(fit: &mut LoadCurve, points: &[Point], largest: f64) {
+    let Some(mut std) = fit.std[0] else {
         return;
     };
     let readings: Vec<f64> = without_load(points, largest).map(|p| p.reading).collect();
     let count = readings.len() as f64;
     let mean = readings.iter().sum::<f64>() / count;
     let about: Vec<f64> = readings.iter().map(|r| r - mean).collect();
-    let of_readings = match readings.len() {
-        0 | 1 => fit.spreads.drift,
-        _ => rms(&about) / (count - 1.0).sqrt() * student(count - 1.0),
-    };
-    fit.std[0] = Some(std.max(of_readings));
-}
-
-/// Standard uncertainties beyond which the zero of the curve contradicts the readings without load.
-const CONTRADICTS: f64 = 2.0;
-
-/// Makes the uncertainty of a zero that the readings without load contradict no less than the difference: the curve passes
-/// a hysteresis in the middle, which no load at its end shows.
-pub(super) fn off(fit: &mut LoadCurve, points: &[Point], largest: f64) {
-    let readings: Vec<f64> = without_load(points, largest).map(|p| p.reading).collect();
-    let Some(std) = fit.std[0].filter(|_| readings.len() > 1) else {
-        return;
-    };
-    let mean = readings.iter().sum::<f64>() / readings.len() as f64;
-    let off = (fit.values[0] - mean).abs();
-    if off > CONTRADICTS * std {
-        fit.std[0] = Some(off);
+    if fit.spreads.drift > 0.0 {
+        std = std.max(match readings.len() {
+            0 | 1 => fit.spreads.drift,
+            _ => rms(&about) / (count - 1.0).sqrt() * student(count - 1.0),
+        });
     }
+    let off = (fit.values[0] - mean).abs();
+    if readings.len() > 1 && off > CONTRADICTS * std {
+        std = off;
+    }
+    fit.std[0] = Some(std);
 }
 
 /// Minimum reported drift of the reading without load, relative to the largest deflection.

@@ -103,24 +103,25 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
     (0..peaks.len())
         .map(|k| {
             let range = starts[k]..starts[k] + lengths(k);
+            let is_last = k + 1 == starts.len();
             let mut faults = faults([force, measured], noises, rest, peaks[k], range.clone());
             let second = (SECOND * size(peaks[k])).max(ABOVE_NOISE * noise);
             let second = second_stroke(&size, peaks[k], range.end, second);
             if range.len() < enough {
-                faults.push(match k + 1 == starts.len() {
+                faults.push(match is_last {
                     true => HitFault::CutShort,
                     false => HitFault::TooSoon,
                 });
             }
             Hit {
+                left: match is_last {
+                    true => 0.0,
+                    false => ringing_left(&measured[range.clone()], noises[1]),
+                },
                 range,
                 peak: peaks[k],
                 faults,
                 second,
-                left: match k + 1 < starts.len() {
-                    true => ringing_left(&measured[starts[k]..starts[k + 1]], noises[1]),
-                    false => 0.0,
-                },
             }
         })
         .collect()
