@@ -1,5 +1,7 @@
 //! The band of `compensate`: chosen from the record and the stand, reproducible, or as given.
 
+use std::f64::consts::TAU;
+
 use crate::noise::Noise;
 use crate::util::{Folder, column, record, steady};
 
@@ -140,4 +142,41 @@ fn a_quiet_start_of_a_long_record_is_said() {
         text.as_bytes(),
     );
     ran.says(0, &["chosen from the stand alone", "s is below the noise"]);
+}
+
+/// White noise that went through a low-pass, an amplifier's or an anti-alias filter, is as large as the torque in the
+/// middle of the spectrum, and far below it at its end.
+#[test]
+fn noise_behind_a_low_pass_is_no_torque() {
+    let (shown, acted) = steady(&PARTS, RATE, 40_000);
+    for (corner_hz, order) in [(2000.0, 1), (3000.0, 4), (6000.0, 8)] {
+        let mut noise = Noise(12);
+        // Poles one after the other, each with the same corner.
+        let part = 1.0 - (-TAU * corner_hz / RATE).exp();
+        let mut poles = vec![0.0; order];
+        let mut filtered = || {
+            let white = 0.01 * noise.normal();
+            poles.iter_mut().fold(white, |input, pole| {
+                *pole += part * (input - *pole);
+                *pole
+            })
+        };
+        let recorded: Vec<f64> = shown.iter().map(|x| x + filtered()).collect();
+        let folder = Folder::new();
+        folder.write("in.csv", record(&recorded, RATE));
+        let ran = folder.run(&compensate("in.csv"));
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+        let top_hz = report["band"]["top_hz"].as_f64().unwrap();
+        assert!((290.0..900.0).contains(&top_hz), "{corner_hz}: {top_hz}");
+        let stated = report["noise"]["record"]["compensated_rms"]
+            .as_f64()
+            .unwrap();
+        let error = rms_error(
+            &column(&folder.read("out.csv"), "compensated_torque_n_m"),
+            &acted,
+        );
+        println!("{corner_hz} Hz: band {top_hz} Hz, error {error}, stated {stated}");
+        assert!((0.7..1.5).contains(&(error / stated)), "{error} {stated}");
+    }
 }

@@ -35,6 +35,10 @@ fn orders_above_the_band_of_a_compensated_record_are_said() {
         ran.says(0, said.as_slice());
         let is_said = ran.stderr.contains("orders-beyond-band");
         assert_eq!(is_said, said.is_some(), "{band}: {}", ran.stderr);
+        // An odd number of samples within the record.
+        let inside = [&orders[..], &["--range", "0.3..1.3"]].concat();
+        let ran = folder.pipe(&inside, torque.stdout.as_bytes());
+        ran.says(0, said.as_slice());
     }
 }
 

@@ -1,5 +1,6 @@
 //! `compensate`: a recorded signal in, the applied torque out.
 
+mod above;
 mod band;
 mod memory;
 mod page;
@@ -34,6 +35,8 @@ use crate::stand::{self, Calibration, Stand, TorqueStd};
 
 /// Frequencies at which the report gives the gain, as fractions of the band.
 const GAIN_POINTS: usize = 9;
+/// Number of frequencies at which the uncertainty is evaluated to find its largest value.
+const UNCERTAIN_POINTS: usize = 400;
 
 /// Inputs read before anything is written.
 struct Opened {
@@ -256,11 +259,26 @@ impl Plan {
                 response_relative_std: std.response.map(|u| u.magnitude_relative),
             }
         };
+        let top_hz = self.filter.band().top_hz();
+        let resonances = warnings::modes(&self.stand)
+            .into_iter()
+            .map(|(natural_hz, _)| natural_hz);
+        let fine = (1..=UNCERTAIN_POINTS).map(|k| top_hz * k as f64 / UNCERTAIN_POINTS as f64);
+        let everywhere = fine.chain(resonances).filter(|hz| *hz <= top_hz);
+        let largest_std = everywhere
+            .map(|hz| at(&(hz, self.filter.response(hz).norm() * beside(hz))))
+            .filter(|at| at.response_relative_std.is_some())
+            .max_by(|a, b| {
+                a.response_relative_std
+                    .partial_cmp(&b.response_relative_std)
+                    .unwrap_or(std::cmp::Ordering::Equal)
+            });
         NoiseReport {
             white_gain: gain.white,
             largest_gain: gain.largest.0,
             largest_gain_at_hz: gain.largest.1,
             gain: gain.curve.iter().map(at).collect(),
+            largest_std,
             record: None,
         }
     }

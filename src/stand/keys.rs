@@ -183,7 +183,7 @@ pub(crate) const SECTIONS: &[StandSection] = &[
         ("lead_resistance", Quantity(Kind::Resistance), "of one wire"),
     ]),
     ("[recorder]", "The amplifier and the recorder.", &[
-        ("gain", Quantity(Kind::Gain), "recorded volts per bridge volt; negative for an inverting amplifier; 1 if it is not given, with a warning where it matters"),
+        ("gain", Quantity(Kind::Gain), "recorded volts per bridge volt, also in dB; negative for an inverting amplifier; 1 if it is not given, with a warning where it matters"),
         ("zero", RecordQuantity, "record at no load, in V, mV/V, mA, Hz, ustrain or N; subtracted from any record in such a unit"),
         ("low_pass", Quantity(Kind::Frequency), "cut-off of a Butterworth low-pass"),
         ("low_pass_order", Whole, "1 (default, an RC low-pass) to 16"),

@@ -28,6 +28,7 @@ pub mod frf;
 pub mod gage;
 pub mod harmonics;
 pub mod noise;
+mod noise_density;
 pub mod onset;
 mod order;
 pub mod peaks;

@@ -9,6 +9,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::compensate::InverseFilter;
+use crate::noise_density::NoiseDensity;
 use crate::spectrum::Density;
 
 /// Sub-bands in which the record is compared with its noise floor.
@@ -81,13 +82,14 @@ impl NoiseGain {
 /// Noise of one record, before and after compensation.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct RecordNoise {
-    /// Root of the recorder's noise density, unit/√Hz, one-sided: the median above the band.
+    /// Root of the recorder's noise density, unit/√Hz, one-sided: the median above the band, or the level around the
+    /// resonance of noise that went through a low-pass.
     pub floor_per_root_hz: f64,
     /// Range the floor was taken from, in Hz.
     pub floor_band_hz: [f64; 2],
-    /// Noise within the band as recorded, rms: `√(S₀ ∫W² df)`.
+    /// Noise within the band as recorded, rms: `√(∫S₀ W² df)`.
     pub recorded_rms: f64,
-    /// Rms of the noise after compensation: `√(S₀ ∫|W H⁻¹|² df)`.
+    /// Rms of the noise after compensation: `√(∫S₀ |W H⁻¹|² df)`.
     pub compensated_rms: f64,
     /// Rms of the record within the band, without its mean, noise included.
     pub in_band_rms: f64,
@@ -102,7 +104,8 @@ impl RecordNoise {
     /// Noise of a record with this density; `None` if there is too little room between the band and
     /// the Nyquist frequency to see the floor, or the density there is zero.
     ///
-    /// The noise floor is assumed white: the same inside the band as above it.
+    /// The noise is white, the same inside the band as above it, unless the record shows that it went through a low-pass
+    /// (`noise_density`).
     #[must_use]
     pub fn of(filter: &InverseFilter, density: &Density) -> Option<Self> {
         let band = filter.band();
@@ -116,10 +119,12 @@ impl RecordNoise {
         }
         above.sort_by(f64::total_cmp);
         let median = above[above.len() / 2];
-        let floor_density = median / density.median_over_mean();
-        if floor_density <= 0.0 {
+        let white = median / density.median_over_mean();
+        if white <= 0.0 {
             return None;
         }
+        let NoiseDensity { values, filtered } = NoiseDensity::of(density, white, filter.inverse());
+        let noise = |f: f64| values[(f / density.step_hz).round() as usize];
         let power = |weight: &dyn Fn(f64, f64) -> f64| -> f64 {
             density
                 .between(0.0, band.end_hz())
@@ -129,13 +134,17 @@ impl RecordNoise {
         };
         let above_mean_square: f64 = density
             .between(band.top_hz(), to_hz)
-            .map(|(f, v)| (v - floor_density) * (1.0 - band.gain(f)).powi(2) * density.step_hz)
+            .map(|(f, v)| (v - noise(f)) * (1.0 - band.gain(f)).powi(2) * density.step_hz)
             .sum();
+        let (floor, floor_band_hz) = match filtered {
+            Some(filtered) => (filtered.level, filtered.range_hz),
+            None => (white, [from_hz, to_hz]),
+        };
         Some(Self {
-            floor_per_root_hz: floor_density.sqrt(),
-            floor_band_hz: [from_hz, to_hz],
-            recorded_rms: power(&|f, _| floor_density * band.gain(f).powi(2)),
-            compensated_rms: power(&|f, _| floor_density * filter.response(f).norm_sqr()),
+            floor_per_root_hz: floor.sqrt(),
+            floor_band_hz,
+            recorded_rms: power(&|f, _| noise(f) * band.gain(f).powi(2)),
+            compensated_rms: power(&|f, _| noise(f) * filter.response(f).norm_sqr()),
             // The first bins contain the mean, spread by the window.
             in_band_rms: power(&|f, v| {
                 if f < 2.0 * density.step_hz {
@@ -145,7 +154,7 @@ impl RecordNoise {
                 }
             }),
             above_band_rms: above_mean_square.max(0.0).sqrt(),
-            lost_hz: lost_ranges(density, band.top_hz(), floor_density),
+            lost_hz: lost_ranges(density, band.top_hz(), &noise),
         })
     }
 
@@ -173,17 +182,15 @@ impl RecordNoise {
 }
 
 /// Sub-bands of `0..top_hz` whose mean density is within 3 dB of the floor, adjacent ones merged.
-fn lost_ranges(density: &Density, top_hz: f64, floor: f64) -> Vec<[f64; 2]> {
+fn lost_ranges(density: &Density, top_hz: f64, noise: &dyn Fn(f64) -> f64) -> Vec<[f64; 2]> {
     let width = top_hz / SUB_BANDS as f64;
     let mut ranges: Vec<[f64; 2]> = Vec::new();
     for i in 0..SUB_BANDS {
         let (from, to) = (width * i as f64, width * (i + 1) as f64);
-        let inside: Vec<f64> = density.between(from, to).map(|(_, v)| v).collect();
-        if inside.is_empty() {
-            continue;
-        }
-        let mean = inside.iter().sum::<f64>() / inside.len() as f64;
-        if mean >= LOST_RATIO * floor {
+        let inside: Vec<(f64, f64)> = density.between(from, to).collect();
+        let record: f64 = inside.iter().map(|(_, v)| v).sum();
+        let floor: f64 = inside.iter().map(|(f, _)| noise(*f)).sum();
+        if inside.is_empty() || record >= LOST_RATIO * floor {
             continue;
         }
         match ranges.last_mut() {

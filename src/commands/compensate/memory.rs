@@ -4,12 +4,13 @@
 use torqcomp_dsp::compensate::whole_record;
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::quality::streamed::StreamedFaults;
-use torqcomp_dsp::spectrum::{Density, StreamedPower};
+use torqcomp_dsp::spectrum::{Density, PowerSum, StreamedPower};
 use torqcomp_dsp::store::SampleStore;
 
+use super::above::{AboveBand, power_above};
 use super::report::CompensateReport;
 use super::sink::{Part, Sink};
-use super::statistics::Sums;
+use super::statistics::{ResultSums, Sums};
 use super::{Plan, Seen, refined};
 use crate::cli::Compensate;
 use crate::commands::convert;
@@ -47,9 +48,9 @@ pub(super) fn run(
     if let Some(density) = density(&record, scale)? {
         report.noise.record = RecordNoise::of(&filter, &density);
     }
-    let mut sums = Sums::NONE;
+    let mut sums = ResultSums::new(filter.half_length());
     let mut deliver = |first: usize, torque: &[f64], recorded: &[f64]| {
-        sums.join(&Sums::of(torque));
+        sums.push(torque, &Sums::of(torque));
         let axis = (record.rate_hz, record.start);
         deliver(args, sink, axis, (first, scale), [torque, recorded])
     };
@@ -61,9 +62,16 @@ pub(super) fn run(
         Some(undo) => refined::run(undo, (&stand, chain.std), &record, report, deliver)?,
     }
     let mut faults = StreamedFaults::default();
-    record
-        .samples
-        .pass(0..count, &mut |_, piece| faults.push(piece))?;
+    let mut above = AboveBand::of(&report.band, record.rate_hz);
+    record.samples.pass(0..count, &mut |first, piece| {
+        faults.push(piece);
+        let mut power = PowerSum::new(LONGEST_BLOCK);
+        power.add_samples(piece);
+        if let Some(power) = power_above(&power, filter.band()) {
+            above.take(power, [first, first + piece.len()]);
+        }
+    })?;
+    report.warnings.extend(above.warning(report));
     report.samples = count;
     report.result = sums.statistics(scale);
     report.resampled = record.resampled;

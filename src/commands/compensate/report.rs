@@ -161,6 +161,8 @@ pub(super) struct NoiseReport {
     pub(super) largest_gain_at_hz: f64,
     /// Gain at some frequencies.
     pub(super) gain: Vec<NoiseAt>,
+    /// Gain where the response is least certain; `null` if its uncertainty is unknown.
+    pub(super) largest_std: Option<NoiseAt>,
     /// Noise of this record, in the unit of the result; `null` if it was not determined.
     pub(super) record: Option<RecordNoise>,
 }
@@ -191,6 +193,9 @@ impl Report for CompensateReport {
         text
     }
 }
+
+/// Relative widening of the range of a result by its ends from which both are given.
+const WIDER: f64 = 0.01;
 
 impl CompensateReport {
     /// The figures for tables of many records.
@@ -304,7 +309,26 @@ impl CompensateReport {
             rounded(result.smallest, 4),
             rounded(result.largest, 4),
             self.unit
-        )
+        ) + &self.inside_text()
+    }
+
+    /// The range away from the ends, if it differs from that of all samples.
+    fn inside_text(&self) -> String {
+        let Statistics {
+            smallest, largest, ..
+        } = self.result;
+        let inside = self.result.inside.filter(|inside| {
+            let wider = largest - smallest - (inside.largest - inside.smallest);
+            wider > WIDER * (inside.largest - inside.smallest)
+        });
+        inside.map_or_else(String::new, |inside| {
+            format!(
+                "; {} to {} {} without the ends, which depend on extrapolation",
+                rounded(inside.smallest, 4),
+                rounded(inside.largest, 4),
+                self.unit
+            )
+        })
     }
 
     /// Amount filled in, and its range of influence.
@@ -366,11 +390,19 @@ impl CompensateReport {
                 let std = rounded(100.0 * std(g)?, 2);
                 Some(format!("{std} % at {} Hz", short(g.frequency_hz)))
             };
-            let known: Vec<String> = self.noise.gain.iter().filter_map(at).collect();
-            match &known[..] {
-                [first, .., last] => Some(format!("{first}, {last}")),
-                _ => known.first().cloned(),
-            }
+            let known: Vec<&NoiseAt> = self
+                .noise
+                .gain
+                .iter()
+                .filter(|g| std(g).is_some())
+                .collect();
+            let (first, last) = (*known.first()?, *known.last()?);
+            // Near the resonance it may be many times larger than at both ends.
+            let is_larger = |g: &&NoiseAt| std(g) > std(first) && std(g) > std(last);
+            let largest = self.noise.largest_std.as_ref().filter(is_larger);
+            let each = [Some(first), largest, Some(last).filter(|_| known.len() > 1)];
+            let each: Vec<String> = each.into_iter().flatten().filter_map(at).collect();
+            Some(each.join(", "))
         };
         let total = listed(|g| g.relative_std);
         match (total, listed(|g| g.response_relative_std)) {

@@ -2,15 +2,17 @@
 
 use std::collections::VecDeque;
 
+use torqcomp_dsp::band::Band;
 use torqcomp_dsp::compensate::{BlockConvolver, InverseFilter, Windows};
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::quality::streamed::StreamedFaults;
 use torqcomp_dsp::resample::{Resampled, Resampler};
 use torqcomp_dsp::spectrum::{Density, PowerSum, welch};
 
+use super::above::{AboveBand, power_above};
 use super::report::CompensateReport;
 use super::sink::{Part, Sink};
-use super::statistics::Sums;
+use super::statistics::{ResultSums, Sums};
 use super::{Plan, Seen};
 use crate::cli::Compensate;
 use crate::commands::convert;
@@ -40,6 +42,8 @@ struct Job {
     torque: Vec<f64>,
     text: Text,
     power: Option<PowerSum>,
+    /// Mean square of the record above the band.
+    above: Option<f64>,
     sums: Option<Sums>,
 }
 
@@ -47,6 +51,7 @@ struct Job {
 struct Steps<'a> {
     half_length: usize,
     noise_block: usize,
+    band: &'a Band,
     grid: Option<&'a StampGrid>,
     rate_hz: f64,
     start: Moment,
@@ -60,7 +65,8 @@ struct Steps<'a> {
 struct Gathered<'a> {
     sink: &'a mut Sink,
     power: PowerSum,
-    sums: Sums,
+    above: AboveBand,
+    sums: ResultSums,
     /// The first samples as recorded: for the quality of the record, and for its noise where it is too short for a
     /// block of the estimate.
     first: Vec<f64>,
@@ -90,6 +96,7 @@ pub(super) fn run(
     let steps = Steps {
         half_length,
         noise_block,
+        band: filter.band(),
         grid,
         rate_hz,
         start: stream.start,
@@ -100,7 +107,8 @@ pub(super) fn run(
     let mut gathered = Gathered {
         sink,
         power: PowerSum::new(noise_block),
-        sums: Sums::NONE,
+        above: AboveBand::of(&report.band, rate_hz),
+        sums: ResultSums::new(half_length),
         first: Vec::new(),
         faults: StreamedFaults::default(),
     };
@@ -149,8 +157,12 @@ impl Gathered<'_> {
         if let Some(part) = &job.power {
             self.power.add(part);
         }
+        if let Some(power) = job.above {
+            let range = [job.first, job.first + job.torque.len()];
+            self.above.take(power, range);
+        }
         if let Some(part) = &job.sums {
-            self.sums.join(part);
+            self.sums.push(&job.torque, part);
         }
         self.faults.push(recorded);
         let missing = excerpt::OF_STREAM - self.first.len();
@@ -167,6 +179,7 @@ impl Gathered<'_> {
             let density = density.scaled(steps.scale * steps.scale);
             report.noise.record = RecordNoise::of(filter, &density);
         }
+        report.warnings.extend(self.above.warning(report));
     }
 
     /// Power density of the record, if it is long enough.
@@ -284,6 +297,7 @@ impl Steps<'_> {
             convolver.convolve(&job.window, &mut job.torque, None);
             power.add_samples(&job.window[self.half_length..self.half_length + length]);
         }
+        job.above = power_above(power, self.band);
         job.sums = Some(Sums::of(&job.torque));
         job.text.clear();
         if !self.is_text {

@@ -41,8 +41,8 @@ pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Tr
     more.extend(of_resonance(report, seen));
     let levels = &report.levels;
     more.extend(levels.warnings(&seen.excerpt, report.scale, &report.unit));
-    let largest = report.result.largest.max(-report.result.smallest);
-    more.extend(off_rated(largest, report.rated_torque, &report.unit));
+    let peak = report.result.peak();
+    more.extend(off_rated(peak, report.rated_torque, &report.unit));
     if traces.is_some_and(Traces::is_empty) {
         more.push(empty_plot(report));
     }

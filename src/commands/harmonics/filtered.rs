@@ -30,7 +30,8 @@ pub(super) fn warning(
     fundamental_hz: f64,
     orders: &[f64],
 ) -> Option<Warning> {
-    let count = record.samples.count().min(MOST);
+    // A block of the spectrum has an even length.
+    let count = record.samples.count().min(MOST) & !1;
     let samples = record.samples.part(0..count).ok()?;
     let density = welch_steep(&samples, record.rate_hz, count).ok()?;
     let top_hz = top(&density, 0.5 * record.rate_hz)?;

@@ -123,23 +123,34 @@ pub(super) fn warnings(
     poor(result);
 }
 
-/// Warns about channels that are shifted in time.
+/// Warns about channels that are shifted in time, with the constants that would allow for it.
 fn shifted(result: &mut Identification, fitted: &FittedRows) {
-    let Some(shift_s) = fitted.shift_s() else {
+    let Some(shift) = fitted.shift() else {
         return;
     };
-    let which = match shift_s > 0.0 {
+    let which = match shift.seconds > 0.0 {
         true => ["torque", "motion"],
         false => ["motion", "torque"],
     };
+    let instead: Vec<String> = result
+        .parameters
+        .iter()
+        .zip(&shift.values)
+        .map(|(constant, value)| {
+            let unit = constant.estimate.unit();
+            format!("{} {} {unit}", constant.name, rounded(*value, 4))
+        })
+        .collect();
     result.warn(
         "channels-shifted",
         format!(
             "the {} is about {} ms late relative to the {}, or is filtered, which the constants, viscous friction \
-             above all, do not allow for; record both channels with one recorder and the same filters",
+             above all, do not allow for; with the delay as one more parameter they would be {}; record both channels \
+             with one recorder and the same filters",
             which[0],
-            rounded(1e3 * shift_s.abs(), 2),
-            which[1]
+            rounded(1e3 * shift.seconds.abs(), 2),
+            which[1],
+            instead.join(", ")
         ),
     );
 }

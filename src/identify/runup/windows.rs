@@ -166,14 +166,24 @@ impl WindowRows {
     }
 }
 
-/// Minimum significant shift in standard uncertainties, and maximum fraction of the residual that may remain with
-/// it.
-const SHIFTED: (f64, f64) = (6.0, 0.85);
+/// Minimum significant shift in standard uncertainties.
+const CLEAR_SHIFT: f64 = 6.0;
+/// A shift matters if it leaves at most this fraction of the residual, or changes a constant by more than this number
+/// of its standard uncertainties.
+const MATTERS: (f64, f64) = (0.85, 3.0);
+
+/// A shift between the channels.
+pub(super) struct Shift {
+    /// Delay of the torque relative to the motion in seconds.
+    pub seconds: f64,
+    /// The parameters with the shift as one more.
+    pub values: Vec<f64>,
+}
 
 impl FittedRows {
-    /// Delay of the torque relative to the motion in seconds, if that explains much of the residual:
-    /// `T(t + τ) ≈ T + τ T'`, so that τ is one more coefficient of the equation.
-    pub fn shift_s(&self) -> Option<f64> {
+    /// A shift between the channels, if it matters: `T(t + τ) ≈ T + τ T'`, so that τ is one more coefficient of the
+    /// equation.
+    pub fn shift(&self) -> Option<Shift> {
         let rows = &self.rows;
         let with = WindowRows {
             columns: [&rows.columns[..], std::slice::from_ref(&rows.slope)].concat(),
@@ -185,11 +195,10 @@ impl FittedRows {
             ..*rows
         };
         let found = with.solve(&self.used).ok()?;
-        let last = rows.columns.len();
-        let (shift_s, std_s) = (
-            -found.numbers.values()[last],
-            found.numbers.covariance().std(last)?,
-        );
+        let mut values = found.numbers.values().to_vec();
+        let std = |fit: &Corrected, k: usize| fit.numbers.covariance().std(k);
+        let std_s = std(&found, values.len() - 1)?;
+        let seconds = -values.pop()?;
         let left = |fit: &Corrected| {
             let used = fit
                 .residuals
@@ -198,8 +207,13 @@ impl FittedRows {
                 .filter(|(_, used)| **used);
             rms(&used.map(|(r, _)| *r).collect::<Vec<f64>>())
         };
-        let is_clear = shift_s.abs() > SHIFTED.0 * std_s;
-        (is_clear && left(&found) < SHIFTED.1 * left(&self.fit)).then_some(shift_s)
+        let is_less = left(&found) < MATTERS.0 * left(&self.fit);
+        let mut changes = values.iter().zip(self.fit.numbers.values()).enumerate();
+        let moves = changes.any(|(k, (new, old))| {
+            std(&self.fit, k).is_some_and(|std| (new - old).abs() > MATTERS.1 * std)
+        });
+        let is_clear = seconds.abs() > CLEAR_SHIFT * std_s;
+        (is_clear && (is_less || moves)).then_some(Shift { seconds, values })
     }
 }
 

@@ -12,8 +12,9 @@
 //! there is only noise it averages to zero, so that extending the band by many lines never pays by chance, and a single
 //! line decides only if it exceeds all the noise up to it.
 //!
-//! `N` is white. It is estimated where the record is weakest: the mean of the three smallest medians of 16 equal parts
-//! between 2 and 98 % of the Nyquist frequency.
+//! `N` is white, unless the record shows that it went through a low-pass (`noise_density`). Its floor is estimated where
+//! the record is weakest: the mean of the three smallest medians of 16 equal parts between 2 and 98 % of the Nyquist
+//! frequency.
 //!
 //! Rounding to steps `q` adds `q²/12` (W. R. Bennett, *Bell Syst. Tech. J.* 27 (1948), 446), white if noise dithers it.
 //! In a quiet periodic record, it forms lines far above the noise instead. If all lines above a frequency together have
@@ -21,6 +22,7 @@
 
 use super::{Band, EDGE, Edge, FALLBACK_FRACTION};
 use crate::compensate::Inverse;
+use crate::noise_density::NoiseDensity;
 use crate::quality::quantisation::quantisation;
 use crate::spectrum::{Density, welch_steep};
 
@@ -74,8 +76,9 @@ pub struct BandSearch {
     /// `|H⁻¹|²` at each line where it is finite; zero for the mean.
     pub(super) power_gain: Vec<f64>,
     pub(super) density: Vec<f64>,
-    pub(super) floor: f64,
-    /// Cumulative sums of `|H⁻¹|²` and of `|H⁻¹|² P` up to each line.
+    /// Density of the noise at each line.
+    pub(super) noise: Vec<f64>,
+    /// Cumulative sums of `|H⁻¹|² N` and of `|H⁻¹|² P` up to each line.
     sums: Vec<[f64; 2]>,
     /// Whether the record contains more than noise.
     has_signal: bool,
@@ -104,18 +107,19 @@ impl BandSearch {
     fn count_rounding(&mut self, rounding_power: f64) {
         let lines = self.density.len();
         let spread = rounding_power / (lines as f64 * self.step_hz);
-        let mut power = ROUNDING * (spread - self.floor) * lines as f64;
+        let noise = self.noise.iter().sum::<f64>();
+        let mut power = ROUNDING * (spread * lines as f64 - noise);
         if power <= 0.0 {
             return;
         }
-        for value in self.density.iter_mut().rev() {
-            power -= (*value - self.floor).max(0.0);
+        for (value, noise) in self.density.iter_mut().zip(&self.noise).rev() {
+            power -= (*value - noise).max(0.0);
             if power < 0.0 {
                 break;
             }
             *value = spread;
         }
-        self.floor = spread;
+        self.noise.fill(spread);
         self.sum();
     }
 
@@ -136,7 +140,7 @@ impl BandSearch {
             has_signal: has_signal(density, floor),
             density: density.values.clone(),
             power_gain,
-            floor,
+            noise: NoiseDensity::of(density, floor, inverse).values,
             sums: Vec::new(),
             edge: &EDGE,
         };
@@ -146,12 +150,12 @@ impl BandSearch {
 
     /// Computes the cumulative sums.
     pub(super) fn sum(&mut self) {
-        let (mut gains, mut record) = (0.0, 0.0);
-        self.sums = vec![[0.0; 2]];
-        for (gain, value) in self.power_gain.iter().zip(&self.density) {
-            gains += gain;
-            record += gain * value;
-            self.sums.push([gains, record]);
+        let mut sums = [0.0; 2];
+        self.sums = vec![sums];
+        let lines = self.noise.iter().zip(&self.density);
+        for (gain, (noise, record)) in self.power_gain.iter().zip(lines) {
+            sums = [sums[0] + gain * noise, sums[1] + gain * record];
+            self.sums.push(sums);
         }
     }
 
@@ -183,15 +187,14 @@ impl BandSearch {
         let lines = self.power_gain.len();
         let line = |hz: f64| ((hz / self.step_hz) as usize + 1).min(lines);
         let (top, end) = (line(top_hz), line(end_hz));
-        let [gain, record] = self.sums[lines];
-        let [gain_to_end, record_to_end] = self.sums[end];
-        let mut noise = self.sums[top][0] * self.floor;
-        let mut lost = record - record_to_end - (gain - gain_to_end) * self.floor;
+        let above = |[noise, record]: [f64; 2]| record - noise;
+        let mut noise = self.sums[top][0];
+        let mut lost = above(self.sums[lines]) - above(self.sums[end]);
         for k in top..end {
             let hz = k as f64 * self.step_hz;
             let kept = 1.0 - self.edge.at((hz - top_hz) / (end_hz - top_hz));
-            noise += self.power_gain[k] * kept * kept * self.floor;
-            lost += self.power_gain[k] * (1.0 - kept).powi(2) * (self.density[k] - self.floor);
+            noise += self.power_gain[k] * kept * kept * self.noise[k];
+            lost += self.power_gain[k] * (1.0 - kept).powi(2) * (self.density[k] - self.noise[k]);
         }
         [noise * self.step_hz, lost * self.step_hz]
     }

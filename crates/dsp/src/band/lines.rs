@@ -91,15 +91,15 @@ impl BandSearch {
     /// Replaces a line by noise; returns its power in the result.
     fn take_out(&mut self, line: usize) -> f64 {
         let reach = LOBE.max((WIDTH * line as f64) as usize);
-        let risen = |k: &usize| self.density[*k] > RISEN * self.floor;
+        let risen = |k: &usize| self.density[*k] > RISEN * self.noise[*k];
         let below = (line.saturating_sub(reach)..line).rev();
         let first = line - below.take_while(risen).count();
         let above = line + 1..(line + reach + 1).min(self.power_gain.len());
         let last = line + above.take_while(risen).count();
         let mut power = 0.0;
         for k in first..=last {
-            power += self.power_gain[k] * (self.density[k] - self.floor).max(0.0) * self.step_hz;
-            self.density[k] = self.floor;
+            power += self.power_gain[k] * (self.density[k] - self.noise[k]).max(0.0) * self.step_hz;
+            self.density[k] = self.noise[k];
         }
         self.sum();
         power

@@ -1,5 +1,7 @@
 //! Kinds of quantity: which units are accepted, and which are printed.
 
+use std::f64::consts::LN_10;
+
 use super::dimension::Dimension;
 use super::error::QuantityError;
 use super::grammar;
@@ -174,10 +176,15 @@ impl Kind {
     /// // 3700 rad/s are 3700/2π = 588.873 Hz.
     /// assert!((Kind::Frequency.parse("3700 rad/s")? - 588.873).abs() < 1e-3);
     /// assert!(Kind::AngularStiffness.parse("8.1e4").is_err());
+    /// // A gain of 40 dB is 10^(40/20) = 100.
+    /// assert_eq!(Kind::Gain.parse("40 dB")?, 100.0);
     /// # Ok::<(), torqcomp_model::QuantityError>(())
     /// ```
     pub fn parse(self, text: &str) -> Result<f64, QuantityError> {
         let (number, unit) = self.split(text)?;
+        if self.is_decibel(unit) {
+            return finite(text, 10_f64.powf(number / 20.0));
+        }
         let scale = match self.scale(text, unit) {
             Err(QuantityError::WrongDimension { .. })
                 if CONSTANTS.contains(&self) && self.is_inverse(number, unit) =>
@@ -214,6 +221,8 @@ impl Kind {
     /// // Of a damping ratio of 0.07: 0.0014 or 0.02?
     /// assert!(Kind::Ratio.parse_std("2 %", "0.07").is_err());
     /// assert!((Kind::Ratio.parse_std("2 %", "7 %")? - 0.02).abs() < 1e-15);
+    /// // 0.1 dB of a gain of 100 are 100·0.1·ln 10/20 = 1.1513.
+    /// assert!((Kind::Gain.parse_std("0.1 dB", "40 dB")? - 1.1513).abs() < 1e-4);
     /// # Ok::<(), torqcomp_model::QuantityError>(())
     /// ```
     pub fn parse_std(self, text: &str, of: &str) -> Result<f64, QuantityError> {
@@ -222,6 +231,9 @@ impl Kind {
             return Err(QuantityError::NegativeUncertainty {
                 got: text.trim().to_owned(),
             });
+        }
+        if self.is_decibel(unit) {
+            return finite(text, self.parse(of)?.abs() * number * LN_10 / 20.0);
         }
         let is_ratio = self.scale(text, "%").is_ok();
         if unit != "%" || is_ratio && of.contains('%') || self == Self::TemperatureAbsolute {
@@ -255,6 +267,11 @@ impl Kind {
     /// ```
     pub fn si_factor(self, unit: &str) -> Result<f64, QuantityError> {
         Ok(self.scale(unit, unit.trim())?.factor)
+    }
+
+    /// Whether a number is 20 times the decimal logarithm of a gain.
+    fn is_decibel(self, unit_text: &str) -> bool {
+        self == Self::Gain && unit_text.eq_ignore_ascii_case("dB")
     }
 
     /// Splits text into number and unit.
