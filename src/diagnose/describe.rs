@@ -44,6 +44,9 @@ pub fn residual(
                 .to_owned(),
         );
     }
+    if found.after.grows_with_level() {
+        parts.push("larger in the records with the larger motion, as noise is not".to_owned());
+    }
     parts.extend(dependence(tests));
     if tests.has_spikes() {
         parts.push(format!(
@@ -70,7 +73,7 @@ pub fn residual(
                 .to_owned(),
         );
     }
-    if verdict != Verdict::Explained {
+    if matches!(verdict, Verdict::Unexplained | Verdict::PartlyExplained) {
         parts.extend(level_dependence(levels));
     }
     let line = |line: &SpectralLine| format!("a line at {} Hz", rounded(line.frequency_hz, 5));

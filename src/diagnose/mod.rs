@@ -24,6 +24,7 @@ mod intersample;
 mod judge;
 mod known_loads;
 mod ladder;
+mod levels;
 mod moment;
 mod noise_floor;
 mod own_of_records;

@@ -183,8 +183,8 @@ impl SearchState {
     }
 
     /// Whether the residual of the plain stand exceeds the noise floor only because that assumes white noise: no test
-    /// detects a dependence on input or motion, and no effect explains a significant part of the training residual.
-    /// With an effect, its own remainder would look the same, and so would torques that were not looked for.
+    /// detects a dependence on input or motion, no effect explains a significant part of the training residual, and it is
+    /// not larger in the records with the larger motion. With an effect, its own remainder would look the same, and so would torques that were not looked for.
     pub(super) fn is_coloured_noise(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
         let error = model.compared_rms();
         let may_be = |floor: NoiseFloor| {
@@ -196,6 +196,7 @@ impl SearchState {
             || !sees_torques
             || !self.noise_floor.is_some_and(may_be)
             || tests.follows_anything()
+            || model.grows_with_level()
         {
             return false;
         }

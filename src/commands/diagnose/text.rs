@@ -63,6 +63,27 @@ impl Report for Diagnosis {
     }
 }
 
+/// Ratio of the hold-out error to the noise floor above which the floor is doubtful.
+const ABOVE_FLOOR: f64 = 1.5;
+
+/// The verdict that nothing is missing. An error above the floor of white noise can be coloured noise, or an effect that
+/// no test shows.
+fn nothing_missing(diagnosis: &Diagnosis) -> String {
+    let error = &diagnosis.error;
+    let ratio = error
+        .noise_floor_rms
+        .map_or(1.0, |floor| error.before.rms.holdout_rms / floor);
+    if ratio <= ABOVE_FLOOR {
+        return "Nothing missing: the plain stand explains the hold-out records down to the noise."
+            .to_owned();
+    }
+    format!(
+        "Nothing missing that these records show: the hold-out error is {} times the floor of white noise, and nothing \
+         tells it from coloured noise. Record the stand at rest: if that is quieter, something is missing.",
+        rounded(ratio, 3)
+    )
+}
+
 /// Findings and remedy: the verdict, each effect with its equation, the next record.
 pub fn answer(diagnosis: &Diagnosis) -> Vec<String> {
     let names = enumeration(&diagnosis.effects, "and");
@@ -77,10 +98,7 @@ pub fn answer(diagnosis: &Diagnosis) -> Vec<String> {
         Verdict::PartlyExplained => format!(
             "Partly explained: {names} {reduce} the hold-out error, but structure above the noise remains."
         ),
-        Verdict::NothingMissing => {
-            "Nothing missing: the plain stand explains the hold-out records down to the noise."
-                .to_owned()
-        }
+        Verdict::NothingMissing => nothing_missing(diagnosis),
         Verdict::Unexplained => {
             "Unexplained: something is missing, and no effect in the list explains it.".to_owned()
         }

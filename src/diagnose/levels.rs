@@ -1,0 +1,69 @@
+//! Tests whether the residual is larger in the records with the larger motion, which noise of any colour is not.
+
+use super::fit::RecordResidual;
+use super::residual_tests::without_mean;
+use super::score::ScoredModel;
+use torqcomp_dsp::dot;
+
+/// Minimum ratio of the powers of the motion for a comparison, and of the powers of the residual.
+const LEVELS: f64 = 1.5;
+const RESIDUALS: f64 = 1.5;
+/// Minimum significance of the latter.
+const SIGNIFICANT: f64 = 3.0;
+
+/// Power of some records together.
+struct Power {
+    motion: f64,
+    residual: f64,
+    /// Relative standard deviation of the power of noise with the spectrum of the residual: each line of a
+    /// spectrum has an exponentially distributed power, so that it is `√(∑p²/2)/∑p` over the lines' powers `p`.
+    scatter: f64,
+}
+
+impl ScoredModel {
+    /// Whether the residual of the training records differs from that of the held-out ones in the direction in which
+    /// their motions differ, by more than noise of its spectrum does.
+    pub fn grows_with_level(&self) -> bool {
+        let Some([train, held]) = Power::of(&self.train)
+            .zip(Power::of(&self.compared))
+            .map(<[Power; 2]>::from)
+        else {
+            return false;
+        };
+        let level = (train.motion / held.motion).ln();
+        let growth = (train.residual / held.residual).ln() * level.signum();
+        let std = train.scatter.hypot(held.scatter);
+        level.abs() > LEVELS.ln() && growth > RESIDUALS.ln().max(SIGNIFICANT * std)
+    }
+}
+
+impl Power {
+    /// `None` without motion, or without a residual.
+    fn of(records: &[RecordResidual]) -> Option<Self> {
+        let count = records.iter().map(|r| r.samples.len()).sum::<usize>() as f64;
+        let mean_square = |x: &[f64]| dot(x, x) / count;
+        let motion = records
+            .iter()
+            .map(|r| mean_square(&without_mean(&r.modelled)))
+            .sum();
+        let residual = records.iter().map(|r| mean_square(&r.samples)).sum();
+        let (mut power, mut square) = (0.0, 0.0);
+        for record in records {
+            let mut samples = record.samples.clone();
+            let plan = torqcomp_fourier::forward(samples.len());
+            let mut spectrum = plan.make_output_vec();
+            plan.process(&mut samples, &mut spectrum).ok()?;
+            for line in &spectrum {
+                power += line.norm_sqr();
+                square += line.norm_sqr().powi(2);
+            }
+        }
+        let scatter = (0.5 * square).sqrt() / power;
+        let is_measured = motion > 0.0 && residual > 0.0 && scatter.is_finite();
+        is_measured.then_some(Self {
+            motion,
+            residual,
+            scatter,
+        })
+    }
+}
