@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 
 use serde_json::Value;
 
+use crate::motion;
 use crate::noise::Noise;
 use crate::util::{Folder, trials};
 
@@ -183,5 +184,53 @@ fn intervals_hold_with_noise_on_the_applied_torque() {
             inside as f64 >= 0.93 * all - 3.0 * (0.0475 * all).sqrt(),
             "{inside} of {all}"
         );
+    }
+}
+
+/// A spring that bends to one side: a constant load that the records do not tell shifts the frequency, and what is not
+/// known of that load belongs to the uncertainty of the frequency.
+#[test]
+fn the_frequency_of_a_spring_that_bends_to_one_side_is_as_sure_as_stated() {
+    let (rate_hz, omega) = (500.0, TAU * 30.0);
+    let rows = |seed: u64, size: f64| {
+        let mut noise = Noise(seed);
+        let phases: Vec<f64> = (0..24).map(|_| TAU * noise.uniform()).collect();
+        let tone = |k: usize, t: f64| (TAU * 2.5 * (k + 2) as f64 * t + phases[k]).sin();
+        let applied = |t: f64| size * (0..24).map(|k| tone(k, t)).sum::<f64>();
+        let slope = |t: f64, [x, v]: [f64; 2]| {
+            let spring = x + 0.01 * x * x - applied(t);
+            [v, -0.06 * omega * v - omega * omega * spring]
+        };
+        let (mut state, fine) = ([0.0; 2], 20);
+        let mut text = String::from("time_s,applied_Nm,measured_Nm\n");
+        for i in 0..6000 {
+            let t = f64::from(i) / rate_hz;
+            text += &format!(
+                "{t:.4},{:.9},{:.9}\n",
+                applied(t),
+                state[0] + 0.02 * noise.normal()
+            );
+            for k in 0..fine {
+                let h = 1.0 / (rate_hz * f64::from(fine));
+                state = motion::step(state, t + f64::from(k) * h, h, slope);
+            }
+        }
+        text
+    };
+    for seed in [1, 2] {
+        let folder = Folder::new();
+        folder.write("train.csv", rows(10 * seed, 0.2));
+        folder.write("holdout.csv", rows(10 * seed + 1, 0.15));
+        let records = ["--train", "train.csv", "--holdout", "holdout.csv"];
+        let channels = ["--applied", "applied", "--measured", "measured", "--json"];
+        let report = folder.json(&[&["diagnose"], &records[..], &channels[..]].concat());
+        assert_eq!(
+            report["effects"],
+            serde_json::json!(["quadratic-stiffness"])
+        );
+        let found = &report["constants"][0];
+        let [hz, std] = ["after", "after_std"].map(|key| found[key].as_f64().unwrap());
+        println!("{hz} ± {std} Hz, true 30");
+        assert!((hz - 30.0).abs() < 3.5 * std && std < 0.05, "{hz} ± {std}");
     }
 }

@@ -6,7 +6,7 @@ use torqcomp_model::fit::{self, Differences, Fit, FitError, Options, Parameter};
 use torqcomp_model::{Chain, Mode};
 
 use super::own_of_records::{OwnOfRecords, within};
-use super::record::{InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord};
+use super::record::{InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord, StateSlopes};
 use super::record_model::RecordModel;
 use super::structure::{PlainStand, Structure};
 use super::unexplained::{Unexplained, raw_residual};
@@ -326,14 +326,20 @@ impl FittedModel {
         self.structure.stand(&self.values)
     }
 
-    /// Nuisance terms of a record. The initial state of an integrated free decay is part of the model instead.
+    /// Nuisance terms of a record, with the displacement under a constant load where that matters. The initial state of an
+    /// integrated free decay is part of the model instead.
     pub fn nuisance(&self, record: &StandRecord, terms: &NuisanceTerms) -> Nuisance {
-        let slopes = || {
-            let model = RecordModel::of(&self.structure, &self.values, self.free);
-            Some(model.residual_and_slopes(record)?.1)
-        };
+        let model = RecordModel::of(&self.structure, &self.values, self.free);
         let rings = record.is_free() && self.integrates();
-        record.nuisance(&self.free, terms, rings.then(slopes).flatten())
+        let slopes = || {
+            let (_, slopes) = model.residual_and_slopes(record)?;
+            Some(StateSlopes {
+                motion: slopes.motion.filter(|_| rings),
+                ..slopes
+            })
+        };
+        let has_slopes = rings || model.chain.has_zero();
+        record.nuisance(&self.free, terms, has_slopes.then(slopes).flatten())
     }
 
     /// Residual of the fitted model on a record, with only the record's own constants, initial state and phases

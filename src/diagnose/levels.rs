@@ -12,7 +12,7 @@ const RESIDUALS: f64 = 1.5;
 const SIGNIFICANT: f64 = 3.0;
 
 /// Power of some records together.
-struct Power {
+struct RecordPower {
     motion: f64,
     residual: f64,
     /// Relative standard deviation of the power of noise with the spectrum of the residual: each line of a
@@ -24,9 +24,9 @@ impl ScoredModel {
     /// Whether the residual of the training records differs from that of the held-out ones in the direction in which
     /// their motions differ, by more than noise of its spectrum does.
     pub fn grows_with_level(&self) -> bool {
-        let Some([train, held]) = Power::of(&self.train)
-            .zip(Power::of(&self.compared))
-            .map(<[Power; 2]>::from)
+        let Some([train, held]) = RecordPower::of(&self.train)
+            .zip(RecordPower::of(&self.compared))
+            .map(<[RecordPower; 2]>::from)
         else {
             return false;
         };
@@ -37,7 +37,7 @@ impl ScoredModel {
     }
 }
 
-impl Power {
+impl RecordPower {
     /// `None` without motion, or without a residual.
     fn of(records: &[RecordResidual]) -> Option<Self> {
         let count = records.iter().map(|r| r.samples.len()).sum::<usize>() as f64;

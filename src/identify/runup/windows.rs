@@ -173,7 +173,7 @@ const CLEAR_SHIFT: f64 = 6.0;
 const MATTERS: (f64, f64) = (0.85, 3.0);
 
 /// A shift between the channels.
-pub(super) struct Shift {
+pub(super) struct LateChannel {
     /// Delay of the torque relative to the motion in seconds.
     pub seconds: f64,
     /// The parameters with the shift as one more.
@@ -183,7 +183,7 @@ pub(super) struct Shift {
 impl FittedRows {
     /// A shift between the channels, if it matters: `T(t + τ) ≈ T + τ T'`, so that τ is one more coefficient of the
     /// equation.
-    pub fn shift(&self) -> Option<Shift> {
+    pub fn shift(&self) -> Option<LateChannel> {
         let rows = &self.rows;
         let with = WindowRows {
             columns: [&rows.columns[..], std::slice::from_ref(&rows.slope)].concat(),
@@ -213,7 +213,7 @@ impl FittedRows {
             std(&self.fit, k).is_some_and(|std| (new - old).abs() > MATTERS.1 * std)
         });
         let is_clear = seconds.abs() > CLEAR_SHIFT * std_s;
-        (is_clear && (is_less || moves)).then_some(Shift { seconds, values })
+        (is_clear && (is_less || moves)).then_some(LateChannel { seconds, values })
     }
 }
 
