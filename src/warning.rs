@@ -37,6 +37,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["fundamental-off", "a fundamental close to the given one fits the record better", "add --refine"],
         ["lines-decide-band", "the upper end of the band is set by a few narrow lines, which may be interference", "if they are not torque, give the --band named in the message"],
         ["load-changes", "the mean torque changes over the record, so the components are averages over different loads", "select a part of constant load with --range"],
+        ["mean-unknown", "an effect such as an AC coupling does not pass a constant, so the mean of the torque and its slope over the record are unknown", "record with DC coupling if you need them"],
         ["mostly-amplified", "the result is more than 10 times the record", "check the mechanics of the stand, the sampling rate and --band"],
         ["mostly-noise", "most of the result is noise", "choose a lower --band, or record with less noise"],
         ["noise-unknown", "the noise of the record cannot be estimated", "choose a lower --band if the result looks noisy"],

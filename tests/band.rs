@@ -180,3 +180,32 @@ fn noise_behind_a_low_pass_is_no_torque() {
         assert!((0.7..1.5).contains(&(error / stated)), "{error} {stated}");
     }
 }
+
+/// A slow torque, and long after the samples from which the band is chosen a pulse of 5 ms.
+#[test]
+fn a_late_pulse_above_the_band_is_said() {
+    let mut noise = Noise(13);
+    let mut sample = |i: usize| {
+        let t = i as f64 / RATE;
+        let pulse = match i {
+            200_000..200_100 => 2.0,
+            _ => 0.0,
+        };
+        1.0 + 0.5 * (TAU * 10.0 * t).sin() + pulse + 1e-3 * noise.normal()
+    };
+    let samples: Vec<f64> = (0..260_000).map(&mut sample).collect();
+    let compensate = ["compensate", "-", "--stand", "stand.toml", "-o", "out.csv"];
+    for more in [&[][..], &["--whole-record"]] {
+        let folder = Folder::new();
+        let args = [&compensate[..], more].concat();
+        let ran = folder.pipe(&args, record(&samples, RATE).as_bytes());
+        ran.says(
+            0,
+            &["signal-above-band", "between", "chosen from the first 6."],
+        );
+        // Without the pulse there is nothing to say.
+        let quiet = record(&samples[..190_000], RATE);
+        let ran = folder.pipe(&[&args[..], &["--force"]].concat(), quiet.as_bytes());
+        assert!(!ran.stderr.contains("signal-above-band"), "{}", ran.stderr);
+    }
+}

@@ -1,5 +1,7 @@
 //! A stand that changes within a record: `diagnose` reports when and what, and names no effect.
 
+use std::f64::consts::TAU;
+
 use serde_json::Value;
 
 use crate::noise::Noise;
@@ -80,4 +82,24 @@ fn what_does_not_happen_at_a_moment() {
         "{}",
         report["changed_stand"]
     );
+}
+
+/// A spring whose stiffness swings slowly by 1 %, held out at a smaller level: what is left is not periodic, follows
+/// nothing sample by sample, and is larger at the larger level, which coloured noise is not.
+#[test]
+fn a_stiffness_that_swings_slowly_is_no_coloured_noise() {
+    let length_s = SAMPLES as f64 / RATE_HZ;
+    for seed in [21, 22] {
+        let swings = |t: f64, x: f64, _: f64| 0.01 * (TAU * t / (1.7 * length_s) + 0.4).sin() * x;
+        let mut noise = Noise(seed);
+        let folder = Folder::new();
+        folder.write("train.csv", record(swings, (0.12, 50.0), &mut noise).0);
+        folder.write("holdout.csv", record(swings, (0.05, 50.0), &mut noise).0);
+        let records = ["--train", "train.csv", "--holdout", "holdout.csv"];
+        let channels = ["--applied", "applied_n_m", "--measured", "measured_n_m"];
+        let report = folder.json(&[&["diagnose", "--json"], &records[..], &channels].concat());
+        let described = &report["residual"]["described"];
+        println!("{described}");
+        assert_eq!(report["verdict"], "unexplained", "{described}");
+    }
 }

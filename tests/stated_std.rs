@@ -192,3 +192,16 @@ fn a_loss_in_the_material_is_part_of_the_gain() {
         "{report}"
     );
 }
+
+/// A series capacitor does not pass the mean of 2 N m.
+#[test]
+fn an_unknown_mean_is_said() {
+    let coupled = "[calibration]\ntorque_per_volt = \"1 N m/V\"\n\
+        [[effects]]\nkind = \"capacitive-coupling\"\nform = \"ac-coupled\"\ncorner = \"1 Hz\"\n";
+    let folder = folder("U [V]", coupled);
+    let ran = folder.run(&[&COMPENSATE[..], &["--band", "50"]].concat());
+    ran.says(0, &["mean-unknown", "capacitive-coupling", "DC coupling"]);
+    let part = ["--band", "50", "--force", "--range", "0.5..1.5"];
+    let ran = folder.run(&[&COMPENSATE[..], &part].concat());
+    ran.says(0, &["a --range that is longer by that"]);
+}

@@ -30,7 +30,7 @@ pub struct Simulate {
     #[arg(long, value_enum, default_value = "band-limited")]
     pub between: Between,
     /// The recording is one period of the applied quantity, or a whole number of them: give the steady-state response
-    /// to its repetition
+    /// to its repetition. Without it, the stand is at rest and without load before the first sample
     #[arg(long)]
     pub periodic: bool,
     /// Unit of the applied quantity, if its heading does not give it

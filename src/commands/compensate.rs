@@ -198,6 +198,7 @@ impl Plan {
             channel: stream.name.clone(),
             channel_unit: unit_text(stream.unit.as_ref()).to_owned(),
             taken_as: "recorded",
+            is_part: args.record.reading.range.is_some(),
             stand: self.stand.file.clone(),
             output: output.to_owned(),
             unit: chain.applied.unit.clone(),
@@ -230,6 +231,7 @@ impl Plan {
                 &chain.warnings,
                 warnings::of_ringing(&self.stand, self.stream.rate_hz).as_slice(),
                 warnings::of_ends(self.undo.as_ref(), edge_s).as_slice(),
+                warnings::of_mean(self.undo.as_ref()).as_slice(),
             ]
             .concat(),
             ..CompensateReport::default()

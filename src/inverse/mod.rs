@@ -126,6 +126,16 @@ impl ChainInverse {
         link.map(|link| link.effect)
     }
 
+    /// The first effect that does not pass a constant.
+    pub(crate) fn blocks_constants(&self) -> Option<&'static str> {
+        let stand = &self.chain.stand;
+        let link = self
+            .links()
+            .iter()
+            .find(|link| link.blocks_constants(stand));
+        link.map(|link| link.effect)
+    }
+
     /// The links in order from torque to record.
     pub(crate) fn links(&self) -> &[Link] {
         self.chain.links()

@@ -104,6 +104,9 @@ pub(in crate::commands) struct CompensateReport {
     /// Printed units per SI unit.
     #[serde(skip)]
     pub(super) scale: f64,
+    /// Whether a part of the recording was selected with `--range`.
+    #[serde(skip)]
+    pub(super) is_part: bool,
     /// What the result is, for people.
     #[serde(skip)]
     pub(super) quantity: &'static str,
@@ -288,13 +291,18 @@ impl CompensateReport {
 
     fn band_text(&self) -> String {
         format!(
-            "compensated up to {} Hz, zero from {} Hz, {}; the first and last {} depend on extrapolation beyond the record",
+            "compensated up to {} Hz, zero from {} Hz, {}; the first and last {} depend on extrapolation beyond the record{}",
             short(self.band_hz),
             short(self.band_end_hz),
             self.band.text(),
             match self.edge_s < 1.0 {
                 true => format!("{} ms", rounded(1e3 * self.edge_s, 3)),
                 false => format!("{} s", rounded(self.edge_s, 3)),
+            },
+            match self.is_part {
+                true =>
+                    " (a --range that is longer by that at both ends has none in the part wanted)",
+                false => "",
             }
         )
     }

@@ -91,6 +91,18 @@ pub(super) fn of_ends(undo: Option<&ChainInverse>, edge_s: f64) -> Option<Warnin
     ))
 }
 
+/// A warning if the record does not contain the mean torque.
+pub(super) fn of_mean(undo: Option<&ChainInverse>) -> Option<Warning> {
+    let effect = undo?.blocks_constants()?;
+    Some(Warning::new(
+        "mean-unknown",
+        format!(
+            "\"{effect}\" does not pass a constant: the mean of the torque and its slope over the record are not in the \
+             record, and those of the result mean nothing; record with DC coupling if you need them"
+        ),
+    ))
+}
+
 /// Natural frequency in Hz and damping ratio of a stand's modes.
 pub(super) fn modes(stand: &Stand) -> Vec<(f64, f64)> {
     let modes = stand.modes().ok();
