@@ -178,6 +178,11 @@ fn noise_behind_a_low_pass_is_no_torque() {
         );
         println!("{corner_hz} Hz: band {top_hz} Hz, error {error}, stated {stated}");
         assert!((0.7..1.5).contains(&(error / stated)), "{error} {stated}");
+        // The noise alone is no signal.
+        let alone: Vec<f64> = (0..40_000).map(|_| filtered()).collect();
+        folder.write("noise.csv", record(&alone, RATE));
+        let report = folder.json(&compensate("noise.csv"));
+        assert_eq!(report["band"]["chosen_from"], "stand", "{}", report["band"]);
     }
 }
 

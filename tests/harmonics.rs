@@ -1,5 +1,7 @@
 //! `harmonics` on a record with known components.
 
+use std::f64::consts::TAU;
+
 use crate::noise::Noise;
 use crate::util::{Folder, HARMONICS, hertel_response, record, steady};
 
@@ -154,4 +156,46 @@ fn a_speed_that_sways_or_is_off_is_said() {
         ["fundamental-off"]
     );
     assert_eq!(codes(swaying(50.0, 0.0, 0.2), "50"), ["order-or-mains"]);
+}
+
+/// Strong lines at whole multiples of 1 Hz in a record of 1 s leak nothing into each other's neighbours, but much into
+/// orders between them.
+#[test]
+fn lines_that_are_no_orders_are_in_the_uncertainty() {
+    let orders = [1.0, 0.5, 0.2];
+    for fundamental_hz in [24.5, 33.5, 41.5] {
+        let mut noise = Noise(9);
+        let mut row = |i: i32| {
+            let t = f64::from(i) / 10_000.0;
+            let line = |hz: f64, size: f64| size * (TAU * hz * t + 0.4).cos();
+            let own = (1..).zip(orders);
+            let own: f64 = own
+                .map(|(k, size)| line(f64::from(k) * fundamental_hz, size))
+                .sum();
+            let torque = own + line(50.0, 0.3) + line(600.0, 0.2) + 0.01 * noise.normal();
+            format!("{t:.4},{torque:.9}\n")
+        };
+        let rows: String = (0..10_000).map(&mut row).collect();
+        let folder = Folder::new();
+        folder.write("in.csv", format!("time_s,compensated_torque_n_m\n{rows}"));
+        let hz = fundamental_hz.to_string();
+        let report = folder.json(&[
+            "harmonics",
+            "in.csv",
+            "--fundamental",
+            &hz,
+            "--orders",
+            "1-8",
+            "--json",
+        ]);
+        for (k, component) in report["components"].as_array().unwrap().iter().enumerate() {
+            let [torque, std] = ["torque", "std"].map(|key| component[key].as_f64().unwrap());
+            let truth = orders.get(k).copied().unwrap_or(0.0);
+            assert!(
+                (torque - truth).abs() < 4.0 * std,
+                "{hz} Hz, order {}: {torque} ± {std}",
+                k + 1
+            );
+        }
+    }
 }

@@ -203,5 +203,5 @@ fn an_unknown_mean_is_said() {
     ran.says(0, &["mean-unknown", "capacitive-coupling", "DC coupling"]);
     let part = ["--band", "50", "--force", "--range", "0.5..1.5"];
     let ran = folder.run(&[&COMPENSATE[..], &part].concat());
-    ran.says(0, &["a --range that is longer by that"]);
+    ran.says(0, &["extend --range by that"]);
 }

@@ -45,7 +45,7 @@ pub fn residual(
         );
     }
     if found.after.grows_with_level() {
-        parts.push("larger in the records with the larger motion, as noise is not".to_owned());
+        parts.push("larger in the records with larger motion, unlike noise".to_owned());
     }
     parts.extend(dependence(tests));
     if tests.has_spikes() {

@@ -326,8 +326,8 @@ impl FittedModel {
         self.structure.stand(&self.values)
     }
 
-    /// Nuisance terms of a record, with the displacement under a constant load where that matters. The initial state of an
-    /// integrated free decay is part of the model instead.
+    /// Nuisance terms of a record, and the displacement under a constant load if the model depends on it. The initial
+    /// state of an integrated free decay is part of the model instead.
     pub fn nuisance(&self, record: &StandRecord, terms: &NuisanceTerms) -> Nuisance {
         let model = RecordModel::of(&self.structure, &self.values, self.free);
         let rings = record.is_free() && self.integrates();

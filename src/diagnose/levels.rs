@@ -1,14 +1,14 @@
-//! Tests whether the residual is larger in the records with the larger motion, which noise of any colour is not.
+//! Test for a residual that grows with the motion, as noise of any colour does not.
 
 use super::fit::RecordResidual;
 use super::residual_tests::without_mean;
 use super::score::ScoredModel;
 use torqcomp_dsp::dot;
 
-/// Minimum ratio of the powers of the motion for a comparison, and of the powers of the residual.
+/// Minimum ratio of the powers of the motion, and of the residual.
 const LEVELS: f64 = 1.5;
 const RESIDUALS: f64 = 1.5;
-/// Minimum significance of the latter.
+/// Minimum significance of the latter ratio, in standard deviations.
 const SIGNIFICANT: f64 = 3.0;
 
 /// Power of some records together.

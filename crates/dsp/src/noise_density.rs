@@ -1,13 +1,14 @@
-//! Density of a recorder's noise at each line of a spectrum: white, or white behind a low-pass.
+//! Density of a recorder's noise at each line of a spectrum: white, or low-pass filtered.
 //!
 //! A stand amplifies torque at its resonance, but not noise that is added behind it. Where the record shows no
 //! resonance in a smooth spectrum around it, that spectrum is noise. If it lies above the white floor at the highest
 //! frequencies, the noise went through a low-pass: an amplifier's, or the recorder's anti-alias filter. With the record's
 //! density `P`, the largest density of torque around the resonance is `T = ∑P/∑|H|²` over the peak, and the noise there
-//! is the lower quartile of `P − T|H|²`. Below the resonance the noise is taken to be the same; above it, no larger than
-//! the smooth part of the record.
+//! is the lower quartile of `P − T|H|²`. Below the resonance the noise is taken to be the same, which is too little if the
+//! corner of the low-pass is below it, too; above, it is no larger than the smooth part of the record.
 
 use crate::compensate::Inverse;
+use crate::quality::median;
 use crate::spectrum::Density;
 
 /// Smallest `|H|²` of a resonance, relative to that at a quarter of its frequency.
@@ -16,8 +17,9 @@ const RESONANT: f64 = 10.0;
 const LOBE: usize = 8;
 /// Points per line at which the response is summed over the peak.
 const FINE: usize = 64;
-/// Range around the resonance, relative to its frequency; its upper end is at most this fraction of the spectrum.
+/// Range around the resonance, relative to its frequency.
 const AROUND: [f64; 2] = [0.5, 1.5];
+/// Upper limit of that range, as a fraction of the spectrum.
 const HIGHEST: f64 = 0.9;
 /// Largest `|H|²` beside the peak, relative to the peak, and the minimum number of such lines.
 const BESIDE: f64 = 0.1;
@@ -36,23 +38,23 @@ const QUARTILE: f64 = -0.6745;
 pub(crate) struct NoiseDensity {
     /// At each line of the spectrum.
     pub values: Vec<f64>,
-    /// If it is not white.
+    /// `None` if it is white.
     pub filtered: Option<FilteredNoise>,
 }
 
-/// Noise behind a low-pass.
+/// Low-pass filtered noise.
 #[derive(Clone, Copy)]
 pub(crate) struct FilteredNoise {
-    /// Its density up to the resonance.
+    /// Its density up to the resonance, unit²/Hz.
     pub level: f64,
-    /// The range that shows it, in Hz.
+    /// Range it was estimated in, in Hz.
     pub range_hz: [f64; 2],
     /// Line of the resonance.
     peak: usize,
 }
 
 impl NoiseDensity {
-    /// The noise in a record, with the white floor at its highest frequencies and the inverse response of the stand.
+    /// Noise of a record with white floor `white`, on a stand with this inverse response.
     pub fn of(density: &Density, white: f64, inverse: &Inverse) -> Self {
         let filtered = filtered(density, white, inverse);
         let values = match &filtered {
@@ -66,10 +68,15 @@ impl NoiseDensity {
 impl FilteredNoise {
     /// The noise at each line.
     fn values(&self, density: &Density, white: f64) -> Vec<f64> {
+        let lines = density.values.len();
         let mut values = vec![self.level; self.peak];
-        for part in density.values[self.peak..].chunks(SMOOTHED) {
-            let smooth = quartile(part.to_vec()) / quartile_over_mean(density);
-            values.resize(values.len() + part.len(), smooth.clamp(white, self.level));
+        while values.len() < lines {
+            // The last part begins earlier, so that all have the same length.
+            let first = values.len().min(lines - SMOOTHED);
+            let part = density.values[first..first + SMOOTHED].to_vec();
+            let smooth = quartile(part) / density.quantile_over_mean(QUARTILE);
+            let to = (values.len() + SMOOTHED).min(lines);
+            values.resize(to, smooth.clamp(white, self.level));
         }
         values
     }
@@ -107,16 +114,16 @@ fn filtered(density: &Density, white: f64, inverse: &Inverse) -> Option<Filtered
         return None;
     }
     let mut all: Vec<f64> = beside.iter().map(|line| record[*line]).collect();
+    let low = quartile(all.clone());
+    let middle = median(&mut all)?;
     let rest = beside
         .iter()
         .map(|line| record[*line] - torque * response[*line]);
     let noise = quartile(rest.collect());
-    all.sort_by(f64::total_cmp);
-    let (low, middle) = (all[all.len() / 4], all[all.len() / 2]);
-    let level = noise / quartile_over_mean(density);
+    let level = noise / density.quantile_over_mean(QUARTILE);
     let is_flat = at_peak <= FLAT * middle * (2 * reach + 1) as f64;
     let is_noise = is_flat && noise > OF_RECORD * low && level > OF_WHITE * white;
-    let range_hz = AROUND.map(|part| part * peak as f64 * density.step_hz);
+    let range_hz = [from, to].map(|line| line as f64 * density.step_hz);
     is_noise.then_some(FilteredNoise {
         level,
         range_hz,
@@ -126,15 +133,8 @@ fn filtered(density: &Density, white: f64, inverse: &Inverse) -> Option<Filtered
 
 /// Lower quartile of some values.
 fn quartile(mut values: Vec<f64>) -> f64 {
-    let place = values.len() / 4;
+    let place = (values.len() - 1) / 4;
     *values.select_nth_unstable_by(place, f64::total_cmp).1
-}
-
-/// Ratio of the lower quartile to the mean of a noise line averaged over these blocks, as for
-/// [`Density::median_over_mean`].
-fn quartile_over_mean(density: &Density) -> f64 {
-    let variance = 2.0 / (9.0 * 2.0 * density.blocks as f64);
-    (1.0 - variance + QUARTILE * variance.sqrt()).powi(3)
 }
 
 #[cfg(test)]
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_behind_a_low_pass_is_told_from_torque() {
+    fn low_pass_filtered_noise_is_distinguished_from_torque() {
         // Noise of 1 through a fourth-order low-pass at 1 kHz above a floor of 1e-4, and lines below 400 Hz.
         let low_pass = |f: f64| 1.0 / (1.0 + (f / 1000.0).powi(8));
         let lines = |f: f64| {
@@ -184,7 +184,7 @@ mod tests {
                 "{hz} Hz: {got} {want}"
             );
         }
-        // White noise, a torque of any density above it, and a torque that falls with the frequency are none.
+        // White noise, a torque of any density above it, and a torque that falls with the frequency are not filtered noise.
         for ratio in [0.002, 0.02, 0.1] {
             let inverse = stand(ratio);
             let torque = |f: f64, size: f64| density_of(size, f, &inverse);

@@ -174,12 +174,17 @@ pub struct Density {
 }
 
 impl Density {
-    /// Ratio of median to mean of a noise line averaged over these blocks: chi-squared with 2 degrees of freedom per
-    /// block (E. B. Wilson, M. M. Hilferty, PNAS 17 (1931), 684).
+    /// Ratio of median to mean of a noise line averaged over these blocks.
     #[must_use]
     pub fn median_over_mean(&self) -> f64 {
-        let freedom = 2.0 * self.blocks as f64;
-        (1.0 - 2.0 / (9.0 * freedom)).powi(3)
+        self.quantile_over_mean(0.0)
+    }
+
+    /// Ratio of a quantile to the mean of such a line, chi-squared with 2 degrees of freedom per block; `normal` is that
+    /// quantile of the standard normal distribution (E. B. Wilson, M. M. Hilferty, PNAS 17 (1931), 684).
+    pub(crate) fn quantile_over_mean(&self, normal: f64) -> f64 {
+        let variance = 2.0 / (9.0 * 2.0 * self.blocks as f64);
+        (1.0 - variance + normal * variance.sqrt()).powi(3)
     }
 
     /// The density for a power scaled by `factor`.

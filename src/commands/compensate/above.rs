@@ -1,9 +1,9 @@
-//! Signal above a band that was chosen before it came.
+//! Signal above the band in a part of the record that was not used to choose it.
 
 use torqcomp_dsp::band::Band;
 use torqcomp_dsp::spectrum::PowerSum;
 
-use super::band::BandReport;
+use super::band::{BandReport, BandSource};
 use super::report::CompensateReport;
 use crate::print::{rounded, short};
 use crate::warning::Warning;
@@ -26,7 +26,8 @@ pub(super) struct AboveBand {
 
 impl AboveBand {
     pub(super) fn of(band: &BandReport, rate_hz: f64) -> Self {
-        let seconds = band.seconds.unwrap_or(0.0);
+        let is_of_signal = band.chosen_from == BandSource::FirstSeconds;
+        let seconds = band.seconds.filter(|_| is_of_signal).unwrap_or(0.0);
         Self {
             chosen_from: (seconds * rate_hz).round() as usize,
             chosen: 0.0,
@@ -59,7 +60,7 @@ impl AboveBand {
             "signal-above-band",
             format!(
                 "between {from} and {to}, {} {} rms of the record lie above the band of {} Hz and are removed; the band \
-                 was chosen from the first {} s, which have nothing like it: give a higher --band",
+                 was chosen from the first {} s, where there is less: give a higher --band",
                 rounded(rms, 3),
                 report.unit,
                 short(report.band_hz),

@@ -63,10 +63,14 @@ pub(super) fn run(
     }
     let mut faults = StreamedFaults::default();
     let mut above = AboveBand::of(&report.band, record.rate_hz);
+    let mut before: Vec<f64> = Vec::new();
     record.samples.pass(0..count, &mut |first, piece| {
         faults.push(piece);
         let mut power = PowerSum::new(LONGEST_BLOCK);
-        power.add_samples(piece);
+        // Blocks across the border of two pieces belong to the later one.
+        let joined = [&before[..], piece].concat();
+        power.add_samples(&joined);
+        before = joined[joined.len().saturating_sub(LONGEST_BLOCK / 2)..].to_vec();
         if let Some(power) = power_above(&power, filter.band()) {
             above.take(power, [first, first + piece.len()]);
         }

@@ -301,7 +301,7 @@ impl CompensateReport {
             },
             match self.is_part {
                 true =>
-                    " (a --range that is longer by that at both ends has none in the part wanted)",
+                    " (to avoid this in the part you need, extend --range by that at both ends)",
                 false => "",
             }
         )
@@ -396,7 +396,7 @@ impl CompensateReport {
         let listed = |std: fn(&NoiseAt) -> Option<f64>| {
             let at = |g: &NoiseAt| {
                 let std = rounded(100.0 * std(g)?, 2);
-                Some(format!("{std} % at {} Hz", short(g.frequency_hz)))
+                Some(format!("{std} % at {} Hz", rounded(g.frequency_hz, 4)))
             };
             let known: Vec<&NoiseAt> = self
                 .noise

@@ -110,9 +110,9 @@ impl Sums {
 pub(super) struct ResultSums {
     /// Samples at either end that depend on extrapolation.
     edge: usize,
-    /// Of them, those skipped at the start.
+    /// Samples skipped at the start so far.
     skipped: usize,
-    /// The last samples, which may be those at the end.
+    /// The last `edge` samples so far: the end, if no more come.
     last: Vec<f64>,
     all: Sums,
     inside: Sums,

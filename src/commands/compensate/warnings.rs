@@ -97,8 +97,8 @@ pub(super) fn of_mean(undo: Option<&ChainInverse>) -> Option<Warning> {
     Some(Warning::new(
         "mean-unknown",
         format!(
-            "\"{effect}\" does not pass a constant: the mean of the torque and its slope over the record are not in the \
-             record, and those of the result mean nothing; record with DC coupling if you need them"
+            "\"{effect}\" does not pass a constant, so the mean of the torque and its slope over the record are unknown, \
+             and those of the result are arbitrary; record with DC coupling if you need them"
         ),
     ))
 }
@@ -170,7 +170,7 @@ fn empty_plot(report: &CompensateReport) -> Warning {
 }
 
 fn of_length(report: &CompensateReport) -> Option<Warning> {
-    let needed = 2.0 * report.edge_s * report.rate_hz;
+    let needed = 2.0 * report.reach_s * report.rate_hz;
     ((report.samples as f64) < needed).then(|| {
         Warning::new(
             "short-record",

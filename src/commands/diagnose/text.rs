@@ -72,14 +72,15 @@ fn nothing_missing(diagnosis: &Diagnosis) -> String {
     let error = &diagnosis.error;
     let ratio = error
         .noise_floor_rms
+        .filter(|floor| *floor > 0.0)
         .map_or(1.0, |floor| error.before.rms.holdout_rms / floor);
     if ratio <= ABOVE_FLOOR {
         return "Nothing missing: the plain stand explains the hold-out records down to the noise."
             .to_owned();
     }
     format!(
-        "Nothing missing that these records show: the hold-out error is {} times the floor of white noise, and nothing \
-         tells it from coloured noise. Record the stand at rest: if that is quieter, something is missing.",
+        "No missing effect detected, but the hold-out error is {} times the noise floor, as coloured noise or an \
+         undetected effect would cause. Record the stand at rest: if that is quieter, something is missing.",
         rounded(ratio, 3)
     )
 }

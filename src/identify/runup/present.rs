@@ -145,7 +145,7 @@ fn shifted(result: &mut Identification, fitted: &FittedRows) {
         "channels-shifted",
         format!(
             "the {} is about {} ms late relative to the {}, or is filtered, which the constants, viscous friction \
-             above all, do not allow for; with the delay as one more parameter they would be {}; record both channels \
+             above all, do not allow for; with the delay as an additional parameter they are {}; record both channels \
              with one recorder and the same filters",
             which[0],
             rounded(1e3 * shift.seconds.abs(), 2),

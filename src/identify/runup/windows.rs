@@ -168,15 +168,15 @@ impl WindowRows {
 
 /// Minimum significant shift in standard uncertainties.
 const CLEAR_SHIFT: f64 = 6.0;
-/// A shift matters if it leaves at most this fraction of the residual, or changes a constant by more than this number
-/// of its standard uncertainties.
+/// A shift matters if it reduces the residual to less than this fraction, or changes a constant by more than this
+/// number of its standard uncertainties.
 const MATTERS: (f64, f64) = (0.85, 3.0);
 
 /// A shift between the channels.
 pub(super) struct LateChannel {
     /// Delay of the torque relative to the motion in seconds.
     pub seconds: f64,
-    /// The parameters with the shift as one more.
+    /// Parameters fitted together with the shift.
     pub values: Vec<f64>,
 }
 

@@ -117,9 +117,11 @@ impl BandSearch {
             if power < 0.0 {
                 break;
             }
-            *value = spread;
+            *value = spread.max(*noise);
         }
-        self.noise.fill(spread);
+        self.noise
+            .iter_mut()
+            .for_each(|noise| *noise = noise.max(spread));
         self.sum();
     }
 
@@ -134,13 +136,14 @@ impl BandSearch {
             .collect();
         let mean_lines = power_gain.len().min(MEAN_LINES);
         power_gain[..mean_lines].fill(0.0);
+        let noise = NoiseDensity::of(density, floor, inverse).values;
         let mut search = Self {
             rate_hz,
             step_hz: density.step_hz,
-            has_signal: has_signal(density, floor),
+            has_signal: has_signal(density, &noise),
             density: density.values.clone(),
             power_gain,
-            noise: NoiseDensity::of(density, floor, inverse).values,
+            noise,
             sums: Vec::new(),
             edge: &EDGE,
         };
@@ -269,15 +272,17 @@ fn white_floor(density: &Density) -> Option<f64> {
 }
 
 /// Whether the sum of all lines differs from noise, or a single one does.
-fn has_signal(density: &Density, floor: f64) -> bool {
-    let values = &density.values[MEAN_LINES.min(density.values.len())..];
-    let scatter = floor / (density.blocks as f64).sqrt();
-    let excess: f64 = values.iter().map(|value| value - floor).sum();
-    let largest = values.iter().copied().fold(0.0, f64::max);
+fn has_signal(density: &Density, noise: &[f64]) -> bool {
+    let from = MEAN_LINES.min(density.values.len());
+    let (values, noise) = (&density.values[from..], &noise[from..]);
+    let scatter = 1.0 / (density.blocks as f64).sqrt();
+    let excess: f64 = values.iter().zip(noise).map(|(v, n)| v - n).sum();
+    let of_sum = noise.iter().map(|n| n * n).sum::<f64>().sqrt();
     // The largest of n exponential values is about ln n times their mean.
     let of_noise = (values.len() as f64).ln();
-    excess > SIGNIFICANT * scatter * (values.len() as f64).sqrt()
-        && largest > floor + (SIGNIFICANT + of_noise) * scatter
+    let most = 1.0 + (SIGNIFICANT + of_noise) * scatter;
+    let mut lines = values.iter().zip(noise);
+    excess > SIGNIFICANT * scatter * of_sum && lines.any(|(v, n)| *v > most * n)
 }
 
 #[cfg(test)]

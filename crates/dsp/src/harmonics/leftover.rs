@@ -58,14 +58,14 @@ impl Leftover {
     }
 }
 
-/// Transform of a stream of samples at the bins near a frequency.
+/// Transform of a stream of samples at whole bins beside a frequency.
 ///
-/// `X(c + d) = Σ_i x_i e^{−2πj (c + d) i/N}`: the sum over the samples is taken at the bin c, and the neighbouring bins
-/// follow from it block by block. Without a window, as in the fit, so that the leakage of a strong line into the
-/// components shows here, too.
+/// `X(c + d) = Σ_i x_i e^{−2πj (c + d) i/N}`: the sum over the samples is taken at the component's own frequency c, and
+/// those at whole numbers d of bins beside it follow from it block by block. Without a window, as in the fit, and with the
+/// component's fraction of a bin, so that the leakage of a strong line into the component shows here, too.
 struct NearBins {
-    /// The bin nearest to the component.
-    centre: usize,
+    /// The component's frequency in bins.
+    centre: f64,
     length: usize,
     /// Samples per block.
     block: usize,
@@ -78,7 +78,7 @@ struct NearBins {
 impl NearBins {
     fn new(step: f64, length: usize) -> Self {
         Self {
-            centre: (step / TAU * length as f64).round() as usize,
+            centre: step / TAU * length as f64,
             length,
             block: length.div_ceil(BLOCKS),
             moments: [Complex64::ZERO; TERMS],
@@ -109,7 +109,7 @@ impl NearBins {
 
     fn add_to_block(&mut self, first: usize, at: usize, samples: &[f64]) {
         let (half, middle) = self.half_and_middle(first);
-        let step = -TAU * self.centre as f64 / self.length as f64;
+        let step = -TAU * self.centre / self.length as f64;
         let mut moments = self.moments;
         rotate(at..at + samples.len(), self.length, step, |i, turn| {
             let u = (i as f64 - middle) / half;
@@ -147,22 +147,21 @@ impl NearBins {
         self.moments = [Complex64::ZERO; TERMS];
     }
 
-    /// Variance of white noise with the mean density over the bins. Negative frequencies mirror positive ones, and
-    /// zero is excluded because the constant is fitted as well.
+    /// Variance of white noise with the mean density over the bins. Negative frequencies mirror positive ones, and those
+    /// within a bin of zero are excluded because the constant is fitted as well.
     fn variance(&self) -> f64 {
-        let (last, widest) = (self.length / 2, *NEAR_BINS.end());
-        let power = |place: usize, bin: usize| {
-            let is_alone = self.length.is_multiple_of(2) && bin == last;
-            self.sums[place].norm_sqr() * if is_alone { 0.5 } else { 1.0 }
-        };
+        let (last, widest) = (0.5 * self.length as f64, *NEAR_BINS.end());
         let near: Vec<f64> = NEAR_BINS
             .flat_map(|away| {
-                let places = [widest + away, widest - away];
-                let bins = [self.centre + away, self.centre.abs_diff(away)];
-                places.into_iter().zip(bins)
+                let bins = [self.centre + away as f64, self.centre - away as f64];
+                [widest + away, widest - away].into_iter().zip(bins)
             })
-            .filter(|(_, bin)| (1..=last).contains(bin))
-            .map(|(place, bin)| power(place, bin))
+            .filter(|(_, bin)| (1.0..=last).contains(&bin.abs()))
+            .map(|(place, bin)| {
+                // All of the power at half the sampling rate is in one bin.
+                let is_alone = bin == last;
+                self.sums[place].norm_sqr() * if is_alone { 0.5 } else { 1.0 }
+            })
             .collect();
         near.iter().sum::<f64>() / (near.len().max(1) * self.length) as f64
     }
@@ -173,11 +172,11 @@ mod tests {
     use super::*;
 
     /// Directly from the definition, term by term.
-    fn power(samples: &[f64], bin: usize) -> f64 {
-        let turn = |i: usize| -TAU * ((bin * i) % samples.len()) as f64 / samples.len() as f64;
+    fn power(samples: &[f64], bin: f64) -> f64 {
+        let turn = |i: usize| -TAU * (bin * i as f64 / samples.len() as f64).fract();
         let terms = samples.iter().enumerate();
         let sum: Complex64 = terms.map(|(i, x)| x * Complex64::cis(turn(i))).sum();
-        let is_alone = 2 * bin == samples.len();
+        let is_alone = 2.0 * bin == samples.len() as f64;
         sum.norm_sqr() / samples.len() as f64 * if is_alone { 0.5 } else { 1.0 }
     }
 
@@ -191,10 +190,10 @@ mod tests {
                 for (place, piece) in samples.chunks(1000).enumerate() {
                     bins.add(1000 * place, piece);
                 }
-                let centre = (frequency * length as f64).round() as usize;
+                let centre = frequency * length as f64;
                 let near: Vec<f64> = NEAR_BINS
-                    .flat_map(|away| [centre + away, centre.abs_diff(away)])
-                    .filter(|bin| (1..=length / 2).contains(bin))
+                    .flat_map(|away| [centre + away as f64, centre - away as f64])
+                    .filter(|bin| (1.0..=0.5 * length as f64).contains(&bin.abs()))
                     .map(|bin| power(&samples, bin))
                     .collect();
                 let want = near.iter().sum::<f64>() / near.len() as f64;

@@ -269,7 +269,7 @@ impl Kind {
         Ok(self.scale(unit, unit.trim())?.factor)
     }
 
-    /// Whether a number is 20 times the decimal logarithm of a gain.
+    /// Whether the unit is the decibel, 20 times the decimal logarithm of a gain.
     fn is_decibel(self, unit_text: &str) -> bool {
         self == Self::Gain && unit_text.eq_ignore_ascii_case("dB")
     }
