@@ -155,7 +155,7 @@ fn noise_behind_a_low_pass_is_no_torque() {
         let part = 1.0 - (-TAU * corner_hz / RATE).exp();
         let mut poles = vec![0.0; order];
         let mut filtered = || {
-            let white = 0.01 * noise.normal();
+            let white = 0.02 * noise.normal();
             poles.iter_mut().fold(white, |input, pole| {
                 *pole += part * (input - *pole);
                 *pole

@@ -317,13 +317,13 @@ impl SearchState {
             .filter_map(|c| c.model.as_ref())
             .collect();
         sort_by_number(&mut alone, |model| model.criterion());
-        // If nothing is left, only a waveform in place of parameters could explain more.
+        // If nothing is left, only a waveform in place of effects could explain more.
         let is_left = remains(&self.after, &self.tests, floor);
-        let count = self.after.parameter_count();
+        let count = self.after.effect_names().len();
         let on_the_way = self.path.iter().chain(self.without.iter().flatten());
         let on_the_way = on_the_way.chain(alone.into_iter().take(MOST_ALONE));
         let mut models = vec![&self.before];
-        for model in on_the_way.filter(|model| is_left || model.parameter_count() < count) {
+        for model in on_the_way.filter(|model| is_left || model.effect_names().len() < count) {
             let structure = &model.fitted.structure;
             if !models
                 .iter()

@@ -6,7 +6,7 @@ use crate::identify::Pole;
 
 /// Minimum number of times for detecting a uniform grid; otherwise each costs a sine, a cosine and an
 /// exponential.
-const MANY: usize = 512;
+const MANY: usize = 32_768;
 /// Number of successive multiplications of a phasor before rounding errors accumulate.
 const BLOCK: usize = 64;
 /// Error of a phasor, in addition to the rounding of its time, up to which times count as uniform.
