@@ -11,6 +11,7 @@ mod lines;
 use std::sync::LazyLock;
 
 use crate::Error;
+use crate::spectrum::Density;
 
 pub use choice::{BandChoice, BandSearch, band_of_stand};
 pub use lines::DecidingLines;
@@ -128,6 +129,24 @@ impl Band {
     pub fn gain(&self, frequency_hz: f64) -> f64 {
         let x = (frequency_hz.abs() - self.top_hz) / (self.end_hz - self.top_hz);
         1.0 - EDGE.at(x)
+    }
+
+    /// Mean square that the band removes from a record up to a frequency, without its noise: `∫(S − N) (1 − W)² df`.
+    ///
+    /// ```
+    /// use torqcomp_dsp::{band::Band, spectrum::Density};
+    /// let band = Band::new(1000.0, 100.0)?;
+    /// let density = Density { step_hz: 1.0, values: vec![3.0; 501], blocks: 1 };
+    /// // The edge ends at 120 Hz: all of 3 − 1 in the lines from 121 to 130 Hz, and in the edge up to 20 lines more.
+    /// let removed = band.cut_off(&density, 130.0, |_| 1.0);
+    /// assert!((20.0..60.0).contains(&removed));
+    /// # Ok::<(), torqcomp_dsp::Error>(())
+    /// ```
+    pub fn cut_off(&self, density: &Density, to_hz: f64, noise: impl Fn(f64) -> f64) -> f64 {
+        density
+            .between(self.top_hz, to_hz)
+            .map(|(f, v)| (v - noise(f)) * (1.0 - self.gain(f)).powi(2) * density.step_hz)
+            .sum()
     }
 }
 

@@ -132,10 +132,6 @@ impl RecordNoise {
                 .sum::<f64>()
                 .sqrt()
         };
-        let above_mean_square: f64 = density
-            .between(band.top_hz(), to_hz)
-            .map(|(f, v)| (v - noise(f)) * (1.0 - band.gain(f)).powi(2) * density.step_hz)
-            .sum();
         let (floor, floor_band_hz) = match filtered {
             Some(filtered) => (filtered.level, filtered.range_hz),
             None => (white, [from_hz, to_hz]),
@@ -153,7 +149,7 @@ impl RecordNoise {
                     v * band.gain(f).powi(2)
                 }
             }),
-            above_band_rms: above_mean_square.max(0.0).sqrt(),
+            above_band_rms: band.cut_off(density, to_hz, noise).max(0.0).sqrt(),
             lost_hz: lost_ranges(density, band.top_hz(), &noise),
         })
     }

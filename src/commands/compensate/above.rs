@@ -35,6 +35,11 @@ impl AboveBand {
         }
     }
 
+    /// Whether the band was chosen from a part of the record, so that the rest is worth a look.
+    pub(super) fn is_open(&self) -> bool {
+        self.chosen_from > 0
+    }
+
     /// Takes the power above the band in a piece with this range of samples.
     pub(super) fn take(&mut self, power: f64, range: [usize; 2]) {
         if range[0] < self.chosen_from {
@@ -47,7 +52,7 @@ impl AboveBand {
     /// A warning if a later piece has much more above the band than those from which it was chosen; `report` has the
     /// noise already.
     pub(super) fn warning(&self, report: &CompensateReport) -> Option<Warning> {
-        let (power, range) = self.later.filter(|_| self.chosen_from > 0)?;
+        let (power, range) = self.later?;
         let rms = (power - self.chosen).max(0.0).sqrt() * report.scale.abs();
         let noise = report.noise.record.as_ref()?.compensated_rms;
         if power <= OF_CHOSEN * self.chosen || rms <= OF_NOISE * noise {
@@ -70,13 +75,8 @@ impl AboveBand {
     }
 }
 
-/// Mean square of the samples above a band: `∫S (1 − W)² df`.
+/// Mean square of the samples above a band.
 pub(super) fn power_above(power: &PowerSum, band: &Band) -> Option<f64> {
     let density = power.density(band.sample_rate_hz())?;
-    let lines = density.between(band.top_hz(), f64::INFINITY);
-    Some(
-        lines
-            .map(|(f, v)| v * (1.0 - band.gain(f)).powi(2) * density.step_hz)
-            .sum(),
-    )
+    Some(band.cut_off(&density, 0.5 * band.sample_rate_hz(), |_| 0.0))
 }

@@ -66,6 +66,9 @@ pub(super) fn run(
     let mut before: Vec<f64> = Vec::new();
     record.samples.pass(0..count, &mut |first, piece| {
         faults.push(piece);
+        if !above.is_open() {
+            return;
+        }
         let mut power = PowerSum::new(LONGEST_BLOCK);
         // Blocks across the border of two pieces belong to the later one.
         let joined = [&before[..], piece].concat();

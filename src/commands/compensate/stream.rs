@@ -51,7 +51,8 @@ struct Job {
 struct Steps<'a> {
     half_length: usize,
     noise_block: usize,
-    band: &'a Band,
+    /// The band, if the record is examined for what lies above it.
+    watched: Option<&'a Band>,
     grid: Option<&'a StampGrid>,
     rate_hz: f64,
     start: Moment,
@@ -93,10 +94,11 @@ pub(super) fn run(
     let grid = grid.as_ref();
     let convolver = BlockConvolver::new(&filter);
     let noise_block = convolver.block_length().min(LONGEST_NOISE_BLOCK);
+    let above = AboveBand::of(&report.band, rate_hz);
     let steps = Steps {
         half_length,
         noise_block,
-        band: filter.band(),
+        watched: above.is_open().then(|| filter.band()),
         grid,
         rate_hz,
         start: stream.start,
@@ -107,7 +109,7 @@ pub(super) fn run(
     let mut gathered = Gathered {
         sink,
         power: PowerSum::new(noise_block),
-        above: AboveBand::of(&report.band, rate_hz),
+        above,
         sums: ResultSums::new(half_length),
         first: Vec::new(),
         faults: StreamedFaults::default(),
@@ -297,7 +299,7 @@ impl Steps<'_> {
             convolver.convolve(&job.window, &mut job.torque, None);
             power.add_samples(&job.window[self.half_length..self.half_length + length]);
         }
-        job.above = power_above(power, self.band);
+        job.above = self.watched.and_then(|band| power_above(power, band));
         job.sums = Some(Sums::of(&job.torque));
         job.text.clear();
         if !self.is_text {
