@@ -136,10 +136,12 @@ impl Band {
     /// ```
     /// use torqcomp_dsp::{band::Band, spectrum::Density};
     /// let band = Band::new(1000.0, 100.0)?;
-    /// let density = Density { step_hz: 1.0, values: vec![3.0; 501], blocks: 1 };
-    /// // The edge ends at 120 Hz: all of 3 − 1 in the lines from 121 to 130 Hz, and in the edge up to 20 lines more.
-    /// let removed = band.cut_off(&density, 130.0, |_| 1.0);
-    /// assert!((20.0..60.0).contains(&removed));
+    /// let mut density = Density { step_hz: 1.0, values: vec![0.0; 501], blocks: 1 };
+    /// // In the middle of the edge, where W is a half, and above its end at 120 Hz.
+    /// (density.values[110], density.values[125]) = (5.0, 3.0);
+    /// let noise = |hz: f64| if hz == 110.0 { 1.0 } else { 0.0 };
+    /// // (5 − 1)/4 + 3.
+    /// assert!((band.cut_off(&density, 500.0, noise) - 4.0).abs() < 1e-12);
     /// # Ok::<(), torqcomp_dsp::Error>(())
     /// ```
     pub fn cut_off(&self, density: &Density, to_hz: f64, noise: impl Fn(f64) -> f64) -> f64 {
