@@ -34,7 +34,8 @@ fn uncertain_rms(model: &ScoredModel, free: &[usize], covariance: &DMatrix<f64>)
     let (_, terms) = fitted.structure.model(&fitted.values);
     let (mut sum, mut count) = (0.0, 0);
     for residual in model.compared.iter() {
-        let columns = derivatives(fitted, &residual.record, &terms).0?;
+        let nuisance = fitted.nuisance_under_load(&residual.record, &terms);
+        let columns = derivatives(fitted, &residual.record, &terms, &nuisance)?;
         for (i, one) in free.iter().enumerate() {
             for (j, other) in free.iter().enumerate() {
                 sum += covariance[(i, j)] * dot(&columns[*one], &columns[*other]);
@@ -53,9 +54,10 @@ fn coloured_covariance(
     let fitted: &FittedModel = &model.fitted;
     let (_, terms) = fitted.structure.model(&fitted.values);
     let training = fitted.with_initial_states(&records.train);
-    let each = training
-        .iter()
-        .map(|record| derivatives(fitted, record, &terms).0);
+    let each = training.iter().map(|record| {
+        let nuisance = fitted.nuisance_under_load(record, &terms);
+        derivatives(fitted, record, &terms, &nuisance)
+    });
     let each: Vec<Vec<Vec<f64>>> = each.collect::<Option<_>>()?;
     // The frequency of a line is fitted together with its phases in each record, so it has no
     // column here.

@@ -326,20 +326,26 @@ impl FittedModel {
         self.structure.stand(&self.values)
     }
 
-    /// Nuisance terms of a record, and the displacement under a constant load if the model depends on it. The initial
-    /// state of an integrated free decay is part of the model instead.
+    /// Nuisance terms of a record. The initial state of an integrated free decay is part of the model instead.
     pub fn nuisance(&self, record: &StandRecord, terms: &NuisanceTerms) -> Nuisance {
-        let model = RecordModel::of(&self.structure, &self.values, self.free);
         let rings = record.is_free() && self.integrates();
-        let slopes = || {
-            let (_, slopes) = model.residual_and_slopes(record)?;
-            Some(StateSlopes {
-                motion: slopes.motion.filter(|_| rings),
-                ..slopes
-            })
-        };
-        let has_slopes = rings || model.chain.has_zero();
-        record.nuisance(&self.free, terms, has_slopes.then(slopes).flatten())
+        let slopes = rings.then(|| self.state_slopes(record)).flatten();
+        record.nuisance(&self.free, terms, slopes)
+    }
+
+    /// The same with the displacement under an unknown constant load, if the model depends on it.
+    pub fn nuisance_under_load(&self, record: &StandRecord, terms: &NuisanceTerms) -> Nuisance {
+        let rings = record.is_free() && self.integrates();
+        let slopes = self.state_slopes(record).map(|slopes| StateSlopes {
+            motion: slopes.motion.filter(|_| rings),
+            ..slopes
+        });
+        record.nuisance(&self.free, terms, slopes)
+    }
+
+    fn state_slopes(&self, record: &StandRecord) -> Option<StateSlopes> {
+        let model = RecordModel::of(&self.structure, &self.values, self.free);
+        Some(model.residual_and_slopes(record)?.1)
     }
 
     /// Residual of the fitted model on a record, with only the record's own constants, initial state and phases

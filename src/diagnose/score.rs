@@ -307,7 +307,8 @@ impl BaseModel {
 /// terms.
 fn slopes(fitted: &FittedModel, record: &StandRecord) -> (Columns, Nuisance) {
     let terms = fitted.structure.context.terms();
-    let (derivatives, nuisance) = derivatives(fitted, record, &terms);
+    let nuisance = fitted.nuisance(record, &terms);
+    let derivatives = derivatives(fitted, record, &terms, &nuisance);
     let mut slopes = Columns::default();
     for derivative in derivatives.into_iter().flatten() {
         slopes.push(derivative);
@@ -320,14 +321,14 @@ fn slopes(fitted: &FittedModel, record: &StandRecord) -> (Columns, Nuisance) {
     (slopes, nuisance)
 }
 
-/// Derivative of a record's residual with respect to each parameter, without nuisance terms, and these terms; `None`
-/// if the motion diverges.
+/// Derivative of a record's residual with respect to each parameter, without nuisance terms; `None` if the motion
+/// diverges.
 pub fn derivatives(
     fitted: &FittedModel,
     record: &StandRecord,
     terms: &NuisanceTerms,
-) -> (Option<Vec<Vec<f64>>>, Nuisance) {
-    let nuisance = fitted.nuisance(record, terms);
+    nuisance: &Nuisance,
+) -> Option<Vec<Vec<f64>>> {
     let rings = record.is_free() && !fitted.integrates();
     let step = |k: usize| STEP * fitted.values[k].abs().max(1e-3);
     let mut points = vec![fitted.values.clone(); fitted.values.len() + 1];
@@ -347,12 +348,10 @@ pub fn derivatives(
         }
         Some(residual)
     });
-    let all = cleared.collect::<Option<Vec<_>>>().map(|residuals| {
-        let along = |(k, there): (usize, &Vec<f64>)| {
-            let pairs = there.iter().zip(&residuals[0]);
-            pairs.map(|(a, b)| (a - b) / step(k)).collect()
-        };
-        residuals[1..].iter().enumerate().map(along).collect()
-    });
-    (all, nuisance)
+    let residuals = cleared.collect::<Option<Vec<_>>>()?;
+    let along = |(k, there): (usize, &Vec<f64>)| {
+        let pairs = there.iter().zip(&residuals[0]);
+        pairs.map(|(a, b)| (a - b) / step(k)).collect()
+    };
+    Some(residuals[1..].iter().enumerate().map(along).collect())
 }
