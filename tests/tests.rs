@@ -51,6 +51,7 @@ mod rates;
 mod recordings;
 mod refined;
 mod reports;
+mod running;
 mod schema;
 mod simulate;
 mod standard_error;

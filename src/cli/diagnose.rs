@@ -15,7 +15,7 @@ pub struct Diagnose {
     #[arg(long, value_name = "FILE")]
     pub stand: Option<PathBuf>,
     /// Record to fit; may be given several times
-    #[arg(long, value_name = "FILE", required_unless_present_any = ["decay", "holdout_decay"])]
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["decay", "holdout_decay", "running"])]
     pub train: Vec<PathBuf>,
     /// Hold-out record; may be given several times [default: the last 30 % of each training record]
     #[arg(long, value_name = "FILE", requires = "train")]
@@ -31,9 +31,13 @@ pub struct Diagnose {
     /// gain, which a free decay does not, and check the effects; may be given several times
     #[arg(long = "static", value_name = "FILE")]
     pub static_loads: Vec<PathBuf>,
+    /// Record of the measured quantity alone while the machine runs: it shows the stand's resonance in use and the lines
+    /// of a steady speed, and checks the result; may be given several times
+    #[arg(long, value_name = "FILE")]
+    pub running: Vec<PathBuf>,
     /// Channel with the applied quantity: its number in inspect, heading or name; for an MCAP file topic and field, as
     /// in '/joint_states.effort[name=motor]', or the field of --topic
-    #[arg(long, value_name = "COL", required_unless_present_any = ["decay", "holdout_decay"])]
+    #[arg(long, value_name = "COL", required_unless_present_any = ["decay", "holdout_decay", "running"])]
     pub applied: Option<String>,
     /// Channel with the measured quantity
     #[arg(long, value_name = "COL")]
@@ -84,6 +88,7 @@ impl Diagnose {
             self.training_files(),
             self.held_out_files(),
             self.static_loads.clone(),
+            self.running.clone(),
         ]
         .concat()
     }

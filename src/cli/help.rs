@@ -22,6 +22,7 @@ const GROUPS: [(&str, &[&str]); 7] = [
             "full-scale",
             "holdout",
             "holdout-decay",
+            "running",
             "static",
             "load",
             "load-unit",

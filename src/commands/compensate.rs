@@ -10,6 +10,7 @@ mod report;
 mod sink;
 mod statistics;
 mod stream;
+mod uncertainty;
 mod warnings;
 
 use std::path::Path;

@@ -1,18 +1,20 @@
 //! `diagnose`: effects missing from the stand model, and the error before and after adding them.
 
+mod checks;
 mod decays;
 mod declared;
 mod loads;
 mod page;
 mod read;
 mod refined;
+mod running;
 mod text;
 
 use std::path::{Path, PathBuf};
 
 use super::{Outcome, conclude};
 use crate::cli::Diagnose;
-use crate::diagnose::{self, Workers};
+use crate::diagnose::{self, Case, Diagnosis, Workers};
 use crate::failure::Failure;
 use crate::io::output;
 use crate::print::Report;
@@ -47,17 +49,9 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
     if refined.is_some() && stand.is_none() && !has_gain {
         return Err(decays::no_gain());
     }
-    let fits = Progress::new(Task::Fits);
-    let progress = |done: usize, of: usize| {
-        fits.report(Amount::of_count(done), Some(Amount::of_count(of)));
-    };
-    let workers = Workers {
-        threads: args.work.thread_count(),
-        progress: &progress,
-    };
-    let mut diagnosis = diagnose::run(read.case, workers)?;
-    drop(fits);
+    let mut diagnosis = fitted(read.case, args.work.thread_count())?;
     diagnosis.check_loads(&read.loads, read.declared_gain)?;
+    diagnosis.check_running(&read.running)?;
     diagnosis.shows_all = args.all;
     if let Some(refined) = &mut refined {
         let declared = stand.as_ref().map(|(stand, text)| (stand, text.as_str()));
@@ -73,6 +67,16 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
         read.is_lossy,
         &args.strictness,
     ))
+}
+
+/// The diagnosis, with its progress.
+fn fitted(case: Case, threads: usize) -> Result<Diagnosis, Failure> {
+    let fits = Progress::new(Task::Fits);
+    let progress = |done: usize, of: usize| {
+        fits.report(Amount::of_count(done), Some(Amount::of_count(of)));
+    };
+    let progress = &progress;
+    diagnose::run(case, Workers { threads, progress })
 }
 
 /// Provenance of the page.

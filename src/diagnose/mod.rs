@@ -27,6 +27,7 @@ mod ladder;
 mod levels;
 mod moment;
 mod noise_floor;
+mod operation;
 mod own_of_records;
 mod pairs;
 mod plain;
@@ -38,6 +39,7 @@ mod records;
 mod refuse;
 mod residual_tests;
 mod result;
+mod running;
 mod score;
 mod search;
 mod several;
@@ -65,7 +67,7 @@ use crate::warning::Warning;
 use declared::DeclaredStand;
 use ladder::Ladder;
 use noise_floor::NoiseFloor;
-use spectra::lines_of;
+use spectra::prominent_lines;
 use structure::FitContext;
 use surface::AskedSurface;
 use verdict::{noise_rms, remains};
@@ -84,6 +86,7 @@ pub use record::{InitialState, StandRecord};
 pub use records::Records;
 pub use residual_tests::ResidualTests;
 pub use result::{Diagnosis, SourceFiles};
+pub use running::{ModeDifference, RunningCheck, RunningRecord};
 pub use score::{EffectParameter, ScoredModel};
 pub use search::{CandidateFit, Workers};
 pub use several_modes::SeveralModes;
@@ -152,9 +155,7 @@ struct SearchState {
     is_outdone: bool,
 }
 
-/// Minimum power of a reported line of the residual relative to its surroundings, and maximum number of
-/// such lines.
-const PROMINENT: f64 = 30.0;
+/// Maximum number of reported lines of the residual.
 const MOST_LINES: usize = 5;
 
 /// Number of single effects with which another waveform of the input is tried.
@@ -338,10 +339,13 @@ impl SearchState {
 
     /// Significant lines in the residual of a model.
     fn lines_of(&self, model: &ScoredModel) -> Vec<SpectralLine> {
-        let to_hz = 0.49 * self.records.rate_hz();
-        let mut lines = lines_of(&model.compared, to_hz, MOST_LINES);
-        lines.retain(|line| line.prominence > PROMINENT);
-        lines
+        let rate_hz = self.records.rate_hz();
+        let residuals: Vec<&[f64]> = model
+            .compared
+            .iter()
+            .map(|r| r.samples.as_slice())
+            .collect();
+        prominent_lines(&residuals, rate_hz, 0.49 * rate_hz, MOST_LINES)
     }
 }
 

@@ -16,6 +16,7 @@ use super::noise_floor::NoiseFloorSource;
 use super::reason::Status;
 use super::record::StandRecord;
 use super::residual_tests::ResidualTests;
+use super::running::RunningCheck;
 use super::score::{RmsErrors, ScoredModel};
 use super::search::CandidateFit;
 use super::spectra::SpectralLine;
@@ -58,6 +59,8 @@ pub struct Diagnosis {
     pub constants: Vec<StandConstant>,
     /// Known loads applied slowly, and the stand's response to them; `null` without any.
     pub known_loads: Option<LoadCheck>,
+    /// What running records show of the stand in use.
+    pub running: Vec<RunningCheck>,
     /// The effects that were tried: accepted ones first, then by hold-out error.
     pub candidates: Vec<CandidateFit>,
     /// For `nothing-missing`: the smallest amount of each effect detectable in the training records.
@@ -187,6 +190,7 @@ impl Diagnosis {
             explained: std::mem::take(&mut found.ladder),
             constants: constants(&case, &found),
             known_loads: None,
+            running: Vec::new(),
             sources: case.sources,
             next_experiment: describe::next_experiment(
                 &found,

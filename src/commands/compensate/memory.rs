@@ -1,6 +1,7 @@
 //! Records processed in memory: in one transform of the whole record, or by inverting effects that no filter
 //! describes.
 
+use torqcomp_dsp::band::Band;
 use torqcomp_dsp::compensate::whole_record;
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::quality::streamed::StreamedFaults;
@@ -61,23 +62,8 @@ pub(super) fn run(
         }
         Some(undo) => refined::run(undo, (&stand, chain.std), &record, report, deliver)?,
     }
-    let mut faults = StreamedFaults::default();
     let mut above = AboveBand::of(&report.band, record.rate_hz);
-    let mut before: Vec<f64> = Vec::new();
-    record.samples.pass(0..count, &mut |first, piece| {
-        faults.push(piece);
-        if !above.is_open() {
-            return;
-        }
-        let mut power = PowerSum::new(LONGEST_BLOCK);
-        // Blocks across the border of two pieces belong to the later one.
-        let joined = [&before[..], piece].concat();
-        power.add_samples(&joined);
-        before = joined[joined.len().saturating_sub(LONGEST_BLOCK / 2)..].to_vec();
-        if let Some(power) = power_above(&power, filter.band()) {
-            above.take(power, [first, first + piece.len()]);
-        }
-    })?;
+    let faults = look_through(&record, filter.band(), &mut above)?;
     report.warnings.extend(above.warning(report));
     report.samples = count;
     report.result = sums.statistics(scale);
@@ -87,6 +73,32 @@ pub(super) fn run(
         excerpt: record.samples.part(0..count.min(excerpt::OF_PASSES))?,
         faults: faults.finish(),
     })
+}
+
+/// Faults of the samples; takes the power above the band.
+fn look_through(
+    record: &UniformRecord<Spool>,
+    band: &Band,
+    above: &mut AboveBand,
+) -> Result<StreamedFaults, Failure> {
+    let mut faults = StreamedFaults::default();
+    let mut before: Vec<f64> = Vec::new();
+    let all = 0..record.samples.count();
+    record.samples.pass(all, &mut |first, piece| {
+        faults.push(piece);
+        if !above.is_open() {
+            return;
+        }
+        let mut power = PowerSum::new(LONGEST_BLOCK);
+        // Blocks across the border of two pieces belong to the later one.
+        let joined = [&before[..], piece].concat();
+        power.add_samples(&joined);
+        before = joined[joined.len().saturating_sub(LONGEST_BLOCK / 2)..].to_vec();
+        if let Some(power) = power_above(&power, band) {
+            above.take(power, [first, first + piece.len()]);
+        }
+    })?;
+    Ok(faults)
 }
 
 /// Power density of a record in printed units, if it is long enough.

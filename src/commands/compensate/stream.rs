@@ -106,14 +106,7 @@ pub(super) fn run(
         is_text: sink.is_text(),
         args,
     };
-    let mut gathered = Gathered {
-        sink,
-        power: PowerSum::new(noise_block),
-        above,
-        sums: ResultSums::new(half_length),
-        first: Vec::new(),
-        faults: StreamedFaults::default(),
-    };
+    let mut gathered = Gathered::new(sink, above, &steps);
     let mut joiner = Joiner::new(grid, rate_hz, half_length);
     // Enough rows that a piece needs only the one after it.
     let (mut blocks, row_plan, mut validator) = stream.into_parts(2 * half_length);
@@ -147,7 +140,18 @@ fn convolvers(first: BlockConvolver, threads: usize) -> Vec<BlockConvolver> {
     all
 }
 
-impl Gathered<'_> {
+impl<'a> Gathered<'a> {
+    fn new(sink: &'a mut Sink, above: AboveBand, steps: &Steps) -> Self {
+        Self {
+            sink,
+            power: PowerSum::new(steps.noise_block),
+            above,
+            sums: ResultSums::new(steps.half_length),
+            first: Vec::new(),
+            faults: StreamedFaults::default(),
+        }
+    }
+
     fn take(&mut self, steps: &Steps, job: &Job) -> Result<(), Failure> {
         let recorded = steps.recorded(&job.window);
         self.sink.take(&Part {

@@ -6,22 +6,16 @@ use std::path::Path;
 use torqcomp_dsp::onset;
 
 use super::read::{FEWEST, Pair};
+use super::running::measured_alone;
 use crate::cli::Diagnose;
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::decay::{self, Ringing};
-use crate::io::{ChannelChoice, Input};
-use crate::recording::AlignedChannels;
 use crate::warning::Warning;
 
 /// The decays in a record of the measured quantity alone, each from its largest swing.
 pub fn decays(args: &Diagnose, file: &Path) -> Result<Vec<Pair>, Failure> {
-    let choice = ChannelChoice::measured_alone(&args.measured, args.measured_unit.as_deref());
-    let read = AlignedChannels::read(&Input::of(file), &[choice], &args.reading)?;
-    let measured = read.channels.into_iter().next().ok_or_else(|| {
-        Failure::failed(ErrorCode::ChannelNotFound, "a channel is needed").at(&read.source)
-    })?;
-    measured.must_be_as_recorded(&read.source)?;
-    let ranges = onset::decays(&measured.samples).into_iter();
+    let read = measured_alone(args, file)?;
+    let ranges = onset::decays(&read.measured).into_iter();
     let long: Vec<Range<usize>> = ranges.filter(|range| range.len() >= FEWEST).collect();
     if long.is_empty() {
         return Err(Failure::failed(
@@ -32,12 +26,12 @@ pub fn decays(args: &Diagnose, file: &Path) -> Result<Vec<Pair>, Failure> {
         )
         .at(&read.source));
     }
-    let times_s = (0..measured.samples.len()).map(|i| read.start.after_s + i as f64 / read.rate_hz);
+    let times_s = (0..read.measured.len()).map(|i| read.start_s + i as f64 / read.rate_hz);
     let ringing = Ringing {
         name: &read.source,
         times_s: &times_s.collect::<Vec<_>>(),
         rate_hz: Some(read.rate_hz),
-        values: &measured.samples,
+        values: &read.measured,
     };
     let doubts = decay::check(&ringing).map_err(|failure| failure.at(&read.source))?;
     let named = doubts.into_iter().map(|doubt| {
@@ -49,11 +43,11 @@ pub fn decays(args: &Diagnose, file: &Path) -> Result<Vec<Pair>, Failure> {
     let pairs = long.into_iter().map(|range| Pair {
         source: read.source.clone(),
         applied: None,
-        measured: measured.samples[range.clone()].to_vec(),
+        measured: read.measured[range.clone()].to_vec(),
         rate_hz: read.rate_hz,
-        start_s: read.start.after_s + range.start as f64 / read.rate_hz,
+        start_s: read.start_s + range.start as f64 / read.rate_hz,
         applied_unit: None,
-        measured_unit: measured.unit.clone(),
+        measured_unit: read.measured_unit.clone(),
         warnings: std::mem::take(&mut warnings),
         is_lossy: read.is_lossy,
     });
@@ -65,8 +59,8 @@ pub fn check_arguments(args: &Diagnose) -> Result<(), Failure> {
     if args.training_files().is_empty() {
         return Err(Failure::usage(
             ErrorCode::MissingArgument,
-            "--holdout-decay only checks a fit, and no record to fit is given: add a free decay with --decay FILE, or \
-             a record with an applied quantity with --train FILE and --applied COL",
+            "--holdout-decay and --running only check a fit, and no record to fit is given: add a free decay with \
+             --decay FILE, or a record with an applied quantity with --train FILE and --applied COL",
         ));
     }
     let of_applied = [

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use super::checks::{load_sentences, running_sentences};
 use super::text::{
     WOULD_SHOW, answer, candidates, cells, constant_rows, error_rows, error_sentences, ladder_rows,
-    limit_rows, load_sentences, share_rows,
+    limit_rows, share_rows,
 };
 use crate::chart::{Chart, Page, Series};
 use crate::diagnose::{
@@ -74,7 +75,10 @@ impl Draft<'_> {
         self.page.heading("Error before and after");
         self.page.table(&error_rows(self.diagnosis));
         let sentences = error_sentences(self.diagnosis).into_iter();
-        for sentence in sentences.chain(load_sentences(self.diagnosis)) {
+        for sentence in sentences
+            .chain(load_sentences(self.diagnosis))
+            .chain(running_sentences(self.diagnosis))
+        {
             self.page.text(&sentence);
         }
         if self.diagnosis.effects.len() > 1 {

@@ -7,11 +7,11 @@ use torqcomp_model::simulate::Excitation;
 use torqcomp_model::{Dimension, Estimate, UnitSystem};
 
 use super::declared::{declared, declared_effects, measures, recorder, several, torques_unknown};
-use super::{decays, loads};
+use super::{decays, loads, running};
 use crate::cli::Diagnose;
 use crate::commands::convert;
 use crate::diagnose::{
-    Case, ChannelUnits, InitialState, KnownLoads, Records, SourceFiles, StandRecord,
+    Case, ChannelUnits, InitialState, KnownLoads, Records, RunningRecord, SourceFiles, StandRecord,
 };
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::{ShowPath, texts};
@@ -84,6 +84,8 @@ pub struct ReadCase {
     pub case: Case,
     /// Loads not used for fitting effects.
     pub loads: Vec<KnownLoads>,
+    /// Records with an unknown torque.
+    pub running: Vec<RunningRecord>,
     /// Static gain in SI units, as far as given by stand file or units.
     pub declared_gain: Option<Estimate>,
     /// Whether part of a record was lost.
@@ -92,7 +94,7 @@ pub struct ReadCase {
 
 /// Reads all records, and the declarations of the stand file about them.
 pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<ReadCase, Failure> {
-    let [train, holdout, loads] = all_pairs(args)?;
+    let [train, holdout, loads, running] = all_pairs(args)?;
     let last_is_held_out = args.train.is_empty() && args.held_out_files().is_empty();
     let first = &train[0];
     let (units, is_calibrated) = units(first, stand, first.applied.is_some() || !loads.is_empty());
@@ -100,17 +102,15 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<ReadCase, Failure>
     let declared = stand
         .map(|stand| declared(stand, gain.unwrap_or(1.0)))
         .transpose()?;
-    let all = || train.iter().chain(&holdout).chain(&loads);
+    let all = || train.iter().chain(&holdout).chain(&loads).chain(&running);
     let mut warnings: Vec<Warning> = all().flat_map(|pair| pair.warnings.clone()).collect();
     let is_lossy = all().any(|pair| pair.is_lossy);
     let calibrated = stand.filter(|_| is_calibrated);
-    warnings.extend(stand.iter().flat_map(|stand| stand.warnings.clone()));
-    if let Some(stand) = calibrated {
-        let calibration = stand.calibration(train[0].measured_channel(), UnitSystem::Si)?;
-        warnings.extend(calibration.warnings);
-    }
+    warnings.extend(stand_warnings(stand, calibrated, first)?);
     let loads = loads.into_iter().map(|pair| loads::known(pair, calibrated));
     let loads = loads.collect::<Result<_, _>>()?;
+    let running = running.into_iter().map(|p| running::record(p, calibrated));
+    let running = running.collect::<Result<_, _>>()?;
     let convert = |pairs: Vec<Pair>| -> Result<Vec<StandRecord>, Failure> {
         let each = pairs.into_iter();
         each.map(|p| record(p, calibrated, &units)).collect()
@@ -148,13 +148,28 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<ReadCase, Failure>
     Ok(ReadCase {
         case,
         loads,
+        running,
         declared_gain: gain.map(|gain| with_declared_std(gain, stand)),
         is_lossy,
     })
 }
 
-/// The training and hold-out records and the known loads, all of one kind.
-fn all_pairs(args: &Diagnose) -> Result<[Vec<Pair>; 3], Failure> {
+/// Warnings of the stand file, and of the calibration that converts the measured quantity.
+fn stand_warnings(
+    stand: Option<&Stand>,
+    calibrated: Option<&Stand>,
+    first: &Pair,
+) -> Result<Vec<Warning>, Failure> {
+    let mut warnings = stand.map_or_else(Vec::new, |stand| stand.warnings.clone());
+    if let Some(stand) = calibrated {
+        let calibration = stand.calibration(first.measured_channel(), UnitSystem::Si)?;
+        warnings.extend(calibration.warnings);
+    }
+    Ok(warnings)
+}
+
+/// The training and hold-out records, the known loads and the running records, all of one kind.
+fn all_pairs(args: &Diagnose) -> Result<[Vec<Pair>; 4], Failure> {
     let (mut train, mut holdout) = pairs(args)?;
     let loads = loads::pairs(args)?;
     if let (Some(load), true) = (loads.first(), args.train.is_empty()) {
@@ -169,7 +184,8 @@ fn all_pairs(args: &Diagnose) -> Result<[Vec<Pair>; 3], Failure> {
     }
     refuse_same_samples(&train, &holdout)?;
     loads::check_units(&loads, first)?;
-    Ok([train, holdout, loads])
+    let running = running::pairs(args, first)?;
+    Ok([train, holdout, loads, running])
 }
 
 /// Holds out the ends of the training records if there is no hold-out record; reports what is held out in place of a

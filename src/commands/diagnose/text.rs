@@ -3,9 +3,10 @@
 use torqcomp_model::Estimate;
 use torqcomp_model::effects::Effect;
 
+use super::checks::{load_sentences, running_sentences};
 use crate::diagnose::{
-    CandidateFit, ChangedStand, CheckedLoads, Diagnosis, ForceSurface, GuardModel,
-    NoiseFloorSource, ShownSide, Status, SurfacePlace, Verdict,
+    CandidateFit, ChangedStand, Diagnosis, ForceSurface, GuardModel, NoiseFloorSource, ShownSide,
+    Status, SurfacePlace, Verdict,
 };
 use crate::print::{
     Report, columns, enumeration, plural, relative, rounded, unit_or_as_recorded, with_std,
@@ -32,7 +33,8 @@ impl Report for Diagnosis {
             answer(self).join("\n"),
             columns(&error_rows(self)),
             error_sentences(self).join("\n"),
-            load_sentences(self)
+            [load_sentences(self), running_sentences(self)]
+                .concat()
                 .iter()
                 .fold(String::new(), |text, line| text + line + "\n"),
             several(self),
@@ -325,34 +327,6 @@ pub fn error_sentences(diagnosis: &Diagnosis) -> Vec<String> {
     });
     let all = improvement.into_iter().chain([floor]).chain(course);
     all.collect()
-}
-
-/// Results from known loads, one sentence each.
-pub fn load_sentences(diagnosis: &Diagnosis) -> Vec<String> {
-    let Some(loads) = &diagnosis.known_loads else {
-        return Vec::new();
-    };
-    let unit = unit_or_as_recorded(&loads.unit);
-    let gain = format!(
-        "The known loads give a static gain of {} {}.",
-        estimate(loads.gain, loads.gain_std),
-        loads.gain_unit
-    );
-    let of_file = |file: &CheckedLoads| {
-        let count = plural(file.loads, "load");
-        let before = rounded(file.before_rms, 4);
-        match diagnosis.effects.is_empty() {
-            true => format!("{}, {count}: the error is {before} {unit}.", file.source),
-            false => format!(
-                "{}, {count}: the error is {before} {unit} for a straight line, and {} {unit} with the effects, which were not \
-                 fitted to them.",
-                file.source,
-                rounded(file.after_rms, 4)
-            ),
-        }
-    };
-    let files = loads.files.iter().map(of_file);
-    std::iter::once(gain).chain(files).collect()
 }
 
 /// Explanation of the detection limits.

@@ -1,0 +1,62 @@
+//! Records of a diagnosis in which the torque is unknown.
+
+use std::path::Path;
+
+use super::read::Pair;
+use crate::cli::Diagnose;
+use crate::diagnose::RunningRecord;
+use crate::failure::{ErrorCode, Failure};
+use crate::io::{ChannelChoice, Input};
+use crate::recording::AlignedChannels;
+use crate::stand::Stand;
+
+/// The record of the measured quantity alone.
+pub(super) fn measured_alone(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
+    let choice = ChannelChoice::measured_alone(&args.measured, args.measured_unit.as_deref());
+    let read = AlignedChannels::read(&Input::of(file), &[choice], &args.reading)?;
+    let measured = read.channels.into_iter().next().ok_or_else(|| {
+        Failure::failed(ErrorCode::ChannelNotFound, "a channel is needed").at(&read.source)
+    })?;
+    measured.must_be_as_recorded(&read.source)?;
+    Ok(Pair {
+        source: read.source,
+        applied: None,
+        measured: measured.samples,
+        rate_hz: read.rate_hz,
+        start_s: read.start.after_s,
+        applied_unit: None,
+        measured_unit: measured.unit,
+        warnings: read.warnings,
+        is_lossy: read.is_lossy,
+    })
+}
+
+/// The running records; the measured quantity must be of the same kind as in another record.
+pub(super) fn pairs(args: &Diagnose, record: &Pair) -> Result<Vec<Pair>, Failure> {
+    let running = args.running.iter().map(|file| measured_alone(args, file));
+    let running: Vec<Pair> = running.collect::<Result<_, _>>()?;
+    let kind = |pair: &Pair| {
+        let named = pair.measured_unit.as_ref();
+        named.map(|named| named.unit.dimension())
+    };
+    match running.iter().find(|other| kind(other) != kind(record)) {
+        None => Ok(running),
+        Some(other) => Err(Failure::failed(
+            ErrorCode::RecordsDiffer,
+            format_args!(
+                "{} and {} have the measured quantity in units of different kinds; give --measured-unit, or convert one \
+                 of them",
+                record.source, other.source
+            ),
+        )),
+    }
+}
+
+/// The record in the unit of the diagnosis; `calibrated` is the stand that converts it to torque.
+pub(super) fn record(pair: Pair, calibrated: Option<&Stand>) -> Result<RunningRecord, Failure> {
+    Ok(RunningRecord {
+        measured: pair.measured_si(calibrated)?,
+        source: pair.source,
+        rate_hz: pair.rate_hz,
+    })
+}
