@@ -94,6 +94,7 @@ fn the_stand_in_use_is_that_of_the_hits() {
         assert!(!codes.contains(&"running-differs") && !codes.contains(&"resonance-hidden"));
         let said = "in use, the natural frequency is";
         assert!(folder.read("page.html").contains(said));
+        assert!(report["running"][0]["hidden"].is_null());
     }
 }
 

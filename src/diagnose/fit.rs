@@ -335,6 +335,10 @@ impl FittedModel {
 
     /// The same with the displacement under an unknown constant load, if the model depends on it.
     pub fn nuisance_under_load(&self, record: &StandRecord, terms: &NuisanceTerms) -> Nuisance {
+        let (model, _) = self.structure.model(&self.values);
+        if !model.has_zero() {
+            return self.nuisance(record, terms);
+        }
         let rings = record.is_free() && self.integrates();
         let slopes = self.state_slopes(record).map(|slopes| StateSlopes {
             motion: slopes.motion.filter(|_| rings),

@@ -67,7 +67,7 @@ use crate::warning::Warning;
 use declared::DeclaredStand;
 use ladder::Ladder;
 use noise_floor::NoiseFloor;
-use spectra::prominent_lines;
+use spectra::lines_of;
 use structure::FitContext;
 use surface::AskedSurface;
 use verdict::{noise_rms, remains};
@@ -86,7 +86,7 @@ pub use record::{InitialState, StandRecord};
 pub use records::Records;
 pub use residual_tests::ResidualTests;
 pub use result::{Diagnosis, SourceFiles};
-pub use running::{ModeDifference, RunningCheck, RunningRecord};
+pub use running::{RunningCheck, RunningRecord};
 pub use score::{EffectParameter, ScoredModel};
 pub use search::{CandidateFit, Workers};
 pub use several_modes::SeveralModes;
@@ -155,7 +155,9 @@ struct SearchState {
     is_outdone: bool,
 }
 
-/// Maximum number of reported lines of the residual.
+/// Minimum power of a reported line of the residual relative to its surroundings, and maximum number of
+/// such lines.
+const PROMINENT: f64 = 30.0;
 const MOST_LINES: usize = 5;
 
 /// Number of single effects with which another waveform of the input is tried.
@@ -339,13 +341,10 @@ impl SearchState {
 
     /// Significant lines in the residual of a model.
     fn lines_of(&self, model: &ScoredModel) -> Vec<SpectralLine> {
-        let rate_hz = self.records.rate_hz();
-        let residuals: Vec<&[f64]> = model
-            .compared
-            .iter()
-            .map(|r| r.samples.as_slice())
-            .collect();
-        prominent_lines(&residuals, rate_hz, 0.49 * rate_hz, MOST_LINES)
+        let to_hz = 0.49 * self.records.rate_hz();
+        let mut lines = lines_of(&model.compared, to_hz, MOST_LINES);
+        lines.retain(|line| line.prominence > PROMINENT);
+        lines
     }
 }
 

@@ -7,12 +7,10 @@ use torqcomp_dsp::rms;
 use torqcomp_model::{Estimate, Mode};
 
 use super::fit::FittedModel;
-use super::operation::{OperatingResonance, resonance};
+use super::operation::{Hidden, OperatingResonance, resonance, steady_lines};
 use super::residual_tests::without_mean;
 use super::result::Diagnosis;
-use super::spectra::{SpectralLine, prominent_lines};
-use crate::failure::{ErrorCode, Failure};
-use crate::print::{relative, rounded, with_std};
+use crate::print::{relative, with_std};
 use crate::warning::Warning;
 
 /// A record of the measured quantity alone, in the unit of the diagnosis.
@@ -22,14 +20,11 @@ pub struct RunningRecord {
     pub rate_hz: f64,
 }
 
-/// Maximum number of lines reported, and of samples in which they are searched for.
-const MOST_LINES: usize = 12;
-const LINES_OVER: usize = 1 << 18;
 /// Reported difference of natural frequency or damping ratio: in standard uncertainties, and the largest error of a
 /// torque it causes.
 const DIFFER: (f64, f64) = (3.0, 0.02);
-/// Frequencies at which that error is looked for, up to this multiple of the natural frequency.
-const LOOKED_AT: usize = 1000;
+/// Frequencies at which that error is looked for, up to this multiple of the natural frequency, which is one of them.
+const LOOKED_AT: usize = 1500;
 const UP_TO: f64 = 1.5;
 
 /// What a running record shows.
@@ -49,12 +44,21 @@ pub struct RunningCheck {
     pub range_hz: Option<[f64; 2]>,
     /// Why the record does not show the resonance; `null` if it does.
     pub hidden: Option<String>,
-    /// The plain stand compared with the stand in use.
+    /// The plain stand compared with the stand in use; `null` if the record does not show that.
     pub before: Option<ModeDifference>,
-    /// The stand with the accepted effects, at small motions, compared with the stand in use.
+    /// The stand with the accepted effects, at small motions, compared with the stand in use; `null` as before.
     pub after: Option<ModeDifference>,
-    /// The strongest steady lines.
-    pub lines: Vec<SpectralLine>,
+    /// The 12 strongest lines of a steady speed.
+    pub lines: Vec<SteadyLine>,
+}
+
+/// A line of a steady speed.
+#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
+pub struct SteadyLine {
+    /// Frequency in Hz.
+    pub frequency_hz: f64,
+    /// Amplitude in the unit of `error`.
+    pub amplitude: f64,
 }
 
 /// A model's resonance compared with that in use.
@@ -64,7 +68,8 @@ pub struct ModeDifference {
     pub natural_frequency: f64,
     /// Damping ratio of the model over that in use, minus 1.
     pub damping_ratio: f64,
-    /// Largest relative error of a torque compensated with the model, up to 1.5 times the natural frequency.
+    /// Largest relative error of a torque compensated with this resonance, up to 1.5 times the natural frequency; of a
+    /// stand with several modes, that of the first alone.
     pub torque: f64,
 }
 
@@ -83,25 +88,12 @@ impl ModeDifference {
 
 impl Diagnosis {
     /// Compares the stand that was found with running records.
-    ///
-    /// # Errors
-    /// If the body has no resonance.
-    pub fn check_running(&mut self, records: &[RunningRecord]) -> Result<(), Failure> {
-        if records.is_empty() {
-            return Ok(());
-        }
-        if self.context().held.is_some() {
-            return Err(Failure::failed(
-                ErrorCode::UnsuitableRecord,
-                "--running does not apply: the body moves freely and has no resonance to look for",
-            ));
-        }
+    pub fn check_running(&mut self, records: &[RunningRecord]) {
         for record in records {
             let (check, warning) = self.checked(record);
             self.running.push(check);
             self.warnings.extend(warning);
         }
-        Ok(())
     }
 
     fn checked(&self, record: &RunningRecord) -> (RunningCheck, Option<Warning>) {
@@ -109,7 +101,10 @@ impl Diagnosis {
         let expected = fitted.free;
         let others = self.context().terms().modes;
         let others: Vec<f64> = others.iter().map(Mode::natural_frequency_hz).collect();
-        let found = resonance(&record.measured, record.rate_hz, &expected, &others);
+        let found = match self.context().held {
+            Some(_) => Err(Hidden::None),
+            None => resonance(&record.measured, record.rate_hz, &expected, &others),
+        };
         let warning = match &found {
             Ok(found) => self.differs(record, found),
             Err(hidden) => Some(Warning::new(
@@ -122,11 +117,15 @@ impl Diagnosis {
             )),
         };
         let unit = self.context().units.per_printed;
-        let looked_at = &record.measured[..record.measured.len().min(LINES_OVER)];
-        let highest_hz = 0.49 * record.rate_hz;
-        let lines = prominent_lines(&[looked_at], record.rate_hz, highest_hz, MOST_LINES);
         let hidden = found.as_ref().err().map(|hidden| hidden.text());
         let found = found.ok();
+        let lines = steady_lines(&record.measured, record.rate_hz, &expected, found.as_ref());
+        let lines = lines
+            .into_iter()
+            .map(|[frequency_hz, amplitude]| SteadyLine {
+                frequency_hz,
+                amplitude: amplitude / unit,
+            });
         let against = |model: &FittedModel| {
             let in_use = found.as_ref()?.mode();
             Some(ModeDifference::of(&model.free, &in_use))
@@ -138,7 +137,7 @@ impl Diagnosis {
             hidden,
             before: against(&self.before.fitted),
             after: against(fitted),
-            lines: lines.into_iter().map(|line| line.over(unit)).collect(),
+            lines: lines.collect(),
             range_hz: found.as_ref().map(|found| found.range_hz),
             natural_frequency: found.as_ref().map(|f| f.natural_frequency.clone()),
             damping_ratio: found.map(|f| f.damping_ratio),
@@ -146,34 +145,45 @@ impl Diagnosis {
         (check, warning)
     }
 
-    /// Warns that the stand in use is another one.
+    /// Warns that the stand in use is another one. Effects may change frequency and damping with the size of the motion,
+    /// so that a stand with effects is not compared.
     fn differs(&self, record: &RunningRecord, found: &OperatingResonance) -> Option<Warning> {
-        let free = self.after.fitted.free;
+        let fitted = &self.after.fitted;
+        if !fitted.structure.effects.is_empty() {
+            return None;
+        }
         let [frequency, ratio, _] = self.after.constants();
-        let apart = |model: f64, of_model: &Estimate, in_use: &Estimate| {
-            let std = [of_model, in_use].map(|e| e.std_uncertainty().unwrap_or(0.0));
-            (model - in_use.value()).abs() > DIFFER.0 * std[0].hypot(std[1])
+        let is_apart = |of_model: &Estimate, in_use: &Estimate| {
+            let stds = of_model.std_uncertainty().zip(in_use.std_uncertainty());
+            let apart = (of_model.value() - in_use.value()).abs();
+            stds.is_some_and(|(one, other)| apart > DIFFER.0 * one.hypot(other))
         };
-        let natural_hz = free.natural_frequency_hz();
-        let difference = ModeDifference::of(&free, &found.mode());
-        let is_apart = apart(natural_hz, &frequency, &found.natural_frequency)
-            || apart(free.damping_ratio, &ratio, &found.damping_ratio);
+        // Only what is known to differ counts.
+        let mut known = found.mode();
+        if is_apart(&frequency, &found.natural_frequency) {
+            known.omega_rad_s = fitted.free.omega_rad_s;
+        }
+        if is_apart(&ratio, &found.damping_ratio) {
+            known.damping_ratio = fitted.free.damping_ratio;
+        }
+        let error = ModeDifference::of(&known, &found.mode()).torque;
         let shown = |estimate: &Estimate| {
             with_std(estimate.value(), estimate.std_uncertainty().unwrap_or(0.0))
         };
-        (is_apart && difference.torque > DIFFER.1).then(|| {
+        (error > DIFFER.1).then(|| {
             Warning::new(
                 "running-differs",
                 format!(
-                    "{}: in use, the stand has a natural frequency of {} Hz and a damping ratio of {}, the stand found {} \
-                     Hz and {}. A torque compensated with the latter is off by up to {} near the resonance: clamping, \
-                     temperature, what is mounted or the size of the motion differs; fit records taken as it is used",
+                    "{}: in use, the stand has a natural frequency of {} Hz and a damping ratio of {}; the stand found has {} \
+                     Hz and {}. A torque compensated with the stand found is off by up to {} near the resonance: the \
+                     clamping, the temperature, the parts mounted or the size of the motion differ. Fit records taken \
+                     under the conditions of use",
                     record.source,
                     shown(&found.natural_frequency),
                     shown(&found.damping_ratio),
-                    rounded(natural_hz, 6),
-                    rounded(free.damping_ratio, 4),
-                    relative(difference.torque, 2),
+                    shown(&frequency),
+                    shown(&ratio),
+                    relative(error, 2),
                 ),
             )
         })

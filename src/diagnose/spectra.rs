@@ -160,35 +160,15 @@ const AROUND: usize = 200;
 /// Lowest line, in resolved frequencies.
 const LOWEST: f64 = 3.0;
 
-/// Minimum power of a prominent line relative to its surroundings.
-const PROMINENT: f64 = 30.0;
-
 /// Strongest lines in residuals up to a frequency, with the power averaged over all records.
 pub fn lines_of(residuals: &[RecordResidual], to_hz: f64, count: usize) -> Vec<SpectralLine> {
-    let series: Vec<&[f64]> = residuals.iter().map(|r| r.samples.as_slice()).collect();
-    let rate_hz = residuals.first().map_or(1.0, |r| r.record.rate_hz());
-    lines_in(&series, rate_hz, to_hz, count)
-}
-
-/// Those of the strongest lines in some series that stand out of their surroundings.
-pub fn prominent_lines(
-    series: &[&[f64]],
-    rate_hz: f64,
-    to_hz: f64,
-    count: usize,
-) -> Vec<SpectralLine> {
-    let mut lines = lines_in(series, rate_hz, to_hz, count);
-    lines.retain(|line| line.prominence > PROMINENT);
-    lines
-}
-
-fn lines_in(series: &[&[f64]], rate_hz: f64, to_hz: f64, count: usize) -> Vec<SpectralLine> {
-    let Some(longest) = series.iter().map(|samples| samples.len()).max() else {
+    let Some(longest) = residuals.iter().map(|r| r.samples.len()).max() else {
         return Vec::new();
     };
+    let rate_hz = residuals[0].record.rate_hz();
     let from_hz = LOWEST * rate_hz / longest as f64;
     let total = (FINER * longest).next_power_of_two();
-    let power = padded_power(series, total);
+    let power = padded_power(residuals, total);
     let step = rate_hz / total as f64;
     let (first, last) = ((from_hz / step).ceil() as usize, (to_hz / step) as usize);
     let last = last.min(power.len().saturating_sub(2));
@@ -202,22 +182,23 @@ fn lines_in(series: &[&[f64]], rate_hz: f64, to_hz: f64, count: usize) -> Vec<Sp
     lines
 }
 
-/// Mean squared amplitude of series at each frequency, with a Hann window, zero-padded to `total` samples.
-fn padded_power(series: &[&[f64]], total: usize) -> Vec<f64> {
+/// Mean squared amplitude of residuals at each frequency, with a Hann window, zero-padded to `total` samples.
+fn padded_power(residuals: &[RecordResidual], total: usize) -> Vec<f64> {
     let plan = torqcomp_fourier::forward(total);
     let mut power = vec![0.0; total / 2 + 1];
-    for samples in series {
+    for residual in residuals {
+        let samples = &residual.samples;
         let n = samples.len() as f64;
         let mean = samples.iter().sum::<f64>() / n;
         let mut padded = plan.make_input_vec();
-        for (i, (p, x)) in padded.iter_mut().zip(*samples).enumerate() {
+        for (i, (p, x)) in padded.iter_mut().zip(samples).enumerate() {
             let window = 1.0 - (TAU * (i as f64 + 0.5) / n).cos();
             *p = (x - mean) * window;
         }
         let mut spectrum = plan.make_output_vec();
         let _ = plan.process(&mut padded, &mut spectrum);
         for (p, s) in power.iter_mut().zip(&spectrum) {
-            *p += s.norm_sqr() * (2.0 / n).powi(2) / series.len() as f64;
+            *p += s.norm_sqr() * (2.0 / n).powi(2) / residuals.len() as f64;
         }
     }
     power

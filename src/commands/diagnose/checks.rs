@@ -3,7 +3,7 @@
 use torqcomp_model::Estimate;
 
 use super::text::estimate;
-use crate::diagnose::{CheckedLoads, Diagnosis, ModeDifference, RunningCheck};
+use crate::diagnose::{CheckedLoads, Diagnosis, RunningCheck};
 use crate::print::{plural, rounded, unit_or_as_recorded};
 
 /// Results from known loads, one sentence each.
@@ -34,11 +34,10 @@ pub fn load_sentences(diagnosis: &Diagnosis) -> Vec<String> {
     std::iter::once(gain).chain(files).collect()
 }
 
-/// What running records show, one sentence each.
+/// What running records show, some sentences each.
 pub fn running_sentences(diagnosis: &Diagnosis) -> Vec<String> {
     let unit = unit_or_as_recorded(&diagnosis.error.unit);
     let of_record = |check: &RunningCheck| {
-        let found = in_use(check, !diagnosis.effects.is_empty());
         let lines = check.lines.iter().map(|line| {
             let [frequency, amplitude] = [line.frequency_hz, line.amplitude].map(|v| rounded(v, 4));
             format!("{frequency} Hz ({amplitude} {unit})")
@@ -47,10 +46,11 @@ pub fn running_sentences(diagnosis: &Diagnosis) -> Vec<String> {
             [] => "No steady lines are found.".to_owned(),
             some => format!("Steady lines: {}.", some.join(", ")),
         };
+        let duration = rounded(check.duration_s, 3);
         format!(
-            "{}, {} s: {found} {lines}",
+            "{}, {duration} s: {} {lines}",
             check.source,
-            rounded(check.duration_s, 3)
+            in_use(check, diagnosis)
         )
     };
     let mut all: Vec<String> = diagnosis.running.iter().map(of_record).collect();
@@ -64,38 +64,23 @@ pub fn running_sentences(diagnosis: &Diagnosis) -> Vec<String> {
     all
 }
 
-/// The resonance that a running record shows, and how the models differ from it.
-fn in_use(check: &RunningCheck, has_effects: bool) -> String {
+/// The resonance that a running record shows beside that of the stand found.
+fn in_use(check: &RunningCheck, diagnosis: &Diagnosis) -> String {
     if let Some(hidden) = &check.hidden {
-        return format!("the resonance does not show: {hidden}.");
+        return format!("the resonance is not visible: {hidden}.");
     }
-    let constants = [&check.natural_frequency, &check.damping_ratio];
-    let [frequency, ratio] = constants.map(|constant| {
-        let shown = |c: &Estimate| estimate(c.value(), c.std_uncertainty());
-        constant.as_ref().map_or_else(String::new, shown)
-    });
-    let std = constants.map(|constant| {
-        let relative = constant.as_ref().and_then(Estimate::relative_std);
-        rounded(100.0 * relative.unwrap_or(0.0), 2)
-    });
-    let of_model = |(name, difference): (&str, Option<ModeDifference>)| {
-        let difference = difference?;
-        let percent = [difference.natural_frequency, difference.damping_ratio];
-        let [by_frequency, by_ratio] = percent.map(|part| format!("{:+.2}", 100.0 * part));
-        Some(format!(
-            " {name} differs by {by_frequency} ± {} % in frequency and {by_ratio} ± {} % in damping.",
-            std[0], std[1]
-        ))
+    let shown = |c: &Estimate| estimate(c.value(), c.std_uncertainty());
+    let in_use = [&check.natural_frequency, &check.damping_ratio];
+    let [frequency, ratio] = in_use.map(|c| c.as_ref().map_or_else(String::new, shown));
+    let [of_stand, ratio_of_stand, _] = diagnosis.after.constants();
+    let at_small = match diagnosis.after.fitted.structure.effects.is_empty() {
+        true => "",
+        false => ", with effects that may change both with the size of the motion",
     };
-    let models = match has_effects {
-        true => vec![
-            ("The plain stand", check.before),
-            ("With the effects, at small motions, it", check.after),
-        ],
-        false => vec![("The stand found", check.before)],
-    };
-    let models: String = models.into_iter().filter_map(of_model).collect();
     format!(
-        "in use, the natural frequency is {frequency} Hz and the damping ratio {ratio}.{models}"
+        "in use, the natural frequency is {frequency} Hz and the damping ratio {ratio}; the stand found has {} Hz and \
+         {}{at_small}.",
+        shown(&of_stand),
+        shown(&ratio_of_stand)
     )
 }

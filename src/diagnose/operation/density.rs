@@ -1,6 +1,7 @@
 //! Densities of a record around a resonance, and their fit to a periodogram.
 
 use std::f64::consts::LN_2;
+use std::ops::Range;
 
 use nalgebra::{SMatrix, SVector};
 use torqcomp_dsp::quality::median;
@@ -15,17 +16,29 @@ const DAMPING: [f64; 3] = [0.4, 1.0, 2.5];
 const FLANK: f64 = 4.0;
 /// Fewest points of a fit.
 const FEWEST: usize = 40;
-/// Blocks of the range in which a law is checked.
+/// Blocks of the range in which a law is checked, parameters that a fit moves, and the deviation in standard deviations
+/// above which it is no chance.
 const BLOCKS: usize = 30;
+const MOVED: f64 = 5.0;
+const SIGNIFICANT: f64 = 3.0;
 /// Largest damping ratio of something called a resonance.
-const MOST_DAMPED: f64 = 0.4;
+pub const MOST_DAMPED: f64 = 0.4;
 /// Steps of a fit, and the change in log-likelihood at which it ends.
 const STEPS: usize = 60;
 const SETTLED: f64 = 1e-4;
+/// Least relative enlargement of the diagonal of the information in a step.
+const LEAST_CAUTION: f64 = 1e-8;
 
 /// Parameters of a density, or derivatives of its logarithm with respect to them.
 pub type DensityParameters = SVector<f64, 5>;
 pub type DensityLaw = fn(&DensityParameters, f64) -> (f64, DensityParameters);
+
+/// A density with a resonance, and the range that it was fitted in.
+#[derive(Debug, Clone)]
+pub struct DensityInRange {
+    pub values: DensityParameters,
+    pub range_hz: Range<f64>,
+}
 
 /// A fitted density.
 #[derive(Clone)]
@@ -44,6 +57,16 @@ impl DensityFit {
     pub fn half_hz(&self) -> f64 {
         (self.values[0] + self.values[1]).exp()
     }
+}
+
+/// Deviation of a record from a density.
+pub struct Deviation {
+    /// Relative rms beyond chance.
+    pub rms: f64,
+    /// Its variance over that by chance, at least 1.
+    pub variance: f64,
+    /// Whether that may be chance.
+    pub is_by_chance: bool,
 }
 
 /// Logarithm of the density with a resonance, of `ln f₀`, `ln ζ`, `b`, `p` and `c`.
@@ -130,12 +153,11 @@ impl MeanLines {
         fits.min_by(|a, b| a.objective.total_cmp(&b.objective))
     }
 
-    /// RMS of the ratio of power to density about 1 over blocks of the range, beyond chance, and its variance relative
-    /// to that by chance, at least 1.
-    pub fn deviation(&self, values: &DensityParameters, correlated: f64) -> (f64, f64) {
+    /// How the ratio of power to density differs from 1 over blocks of the range.
+    pub fn deviation(&self, values: &DensityParameters, correlated: f64) -> Deviation {
         let blocks = self.0.chunks(self.0.len().div_ceil(BLOCKS));
         let count = blocks.len() as f64;
-        let (mut excess, mut ratio) = (0.0, 0.0);
+        let (mut excess, mut ratio, mut lines) = (0.0, 0.0, 0.0);
         for block in blocks {
             let (mut sum, mut weight) = (0.0, 0.0);
             for point in block {
@@ -145,9 +167,16 @@ impl MeanLines {
             let by_chance = correlated / weight;
             let square = (sum / weight - 1.0).powi(2);
             excess += (square - by_chance) / count;
-            ratio += square / by_chance / count;
+            ratio += square / by_chance / (count - MOVED).max(1.0);
+            lines += weight / count;
         }
-        (excess.max(0.0).sqrt(), ratio.max(1.0))
+        // A mean of exponentially distributed lines has the kurtosis 3 + 6/n.
+        let scatter = ((2.0 + 6.0 * correlated / lines) / count).sqrt();
+        Deviation {
+            rms: excess.max(0.0).sqrt(),
+            variance: ratio.max(1.0),
+            is_by_chance: ratio < 1.0 + SIGNIFICANT * scatter,
+        }
     }
 
     /// The parameters of a law by Fisher scoring: steps `F⁻¹ ∑ (P/S − 1) d`, `F = ∑ d dᵀ`, with `d` the derivatives of
@@ -165,20 +194,19 @@ impl MeanLines {
         };
         let mut values = start;
         let mut present = objective(&values);
-        let mut information = SMatrix::zeros();
         let mut caution = 1e-3;
         for _ in 0..STEPS {
-            let gradient;
-            (gradient, information) = self.scores(law, &values);
+            let (gradient, information) = self.scores(law, &values);
             let before = present;
             while caution < 1e9 {
                 let mut damped = information;
                 damped.set_diagonal(&(information.diagonal() * (1.0 + caution)));
-                let next = values + damped.cholesky()?.solve(&gradient);
-                let there = objective(&next);
-                if there <= present {
-                    (values, present) = (next, there);
-                    caution *= 0.1;
+                let step = damped.cholesky().map(|factors| factors.solve(&gradient));
+                let next = step.map(|step| values + step);
+                let better = next.filter(|next| objective(next) <= present);
+                if let Some(next) = better {
+                    (values, present) = (next, objective(&next));
+                    caution = (0.1 * caution).max(LEAST_CAUTION);
                     break;
                 }
                 caution *= 10.0;
@@ -187,6 +215,7 @@ impl MeanLines {
                 break;
             }
         }
+        let (_, information) = self.scores(law, &values);
         present.is_finite().then_some(DensityFit {
             values,
             objective: present,

@@ -7,7 +7,8 @@
 //!
 //! with the noise `e^c` of the recorder. The lines `P` of a periodogram are exponentially distributed about it, so that
 //! `ln f₀`, `ln ζ`, `b`, `p` and `c` minimise `∑ ln S + P/S` (P. Whittle, Ark. Mat. 2 (1953), 423). Lines of a steady speed
-//! are left out. Nothing follows about the level of the torque.
+//! are left out. The spectrum of an order whose speed rises is smooth itself, so that it scatters less than that, and the
+//! uncertainties are rather too large. Nothing follows about the level of the torque.
 
 mod density;
 mod periodogram;
@@ -15,10 +16,11 @@ mod periodogram;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
+use torqcomp_dsp::sort_by_number;
 use torqcomp_model::{Estimate, Mode};
 
 use crate::print::rounded;
-use density::{DensityFit, DensityParameters, resonant, smooth};
+use density::{DensityFit, DensityInRange, DensityParameters, MOST_DAMPED, resonant, smooth};
 use periodogram::{MeanLines, PER_HALF_BANDWIDTH, Periodogram};
 
 /// Maximum number of samples; of more, the first count.
@@ -34,6 +36,14 @@ const REACHES: [f64; 3] = [15.0, 8.0, 5.0];
 const WIDEST: [f64; 2] = [0.4, 1.8];
 /// Highest frequency, relative to the sampling rate.
 const HIGHEST: f64 = 0.45;
+/// Least width of a resonance relative to that expected, in a record too short for it.
+const NARROWEST: f64 = 0.3;
+/// Least damping ratio with which a record is searched.
+const LEAST_DAMPED: f64 = 1e-4;
+/// Maximum number of lines reported.
+const MOST_LINES: usize = 12;
+/// Factor that keeps a rounded minimum sufficient.
+const ROUNDED_UP: f64 = 1.05;
 /// Repetitions of fit and search for such lines.
 const ROUNDS: usize = 4;
 /// Least gain in log-likelihood over a density without a resonance.
@@ -48,6 +58,8 @@ pub struct OperatingResonance {
     pub damping_ratio: Estimate,
     /// The range in Hz from which it follows.
     pub range_hz: [f64; 2],
+    /// The density of the record there.
+    density: DensityInRange,
 }
 
 impl OperatingResonance {
@@ -62,10 +74,12 @@ impl OperatingResonance {
 /// Why a record does not show the resonance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Hidden {
-    /// It is shorter than this time.
+    /// The stand has none: the body is free, or damped too much.
+    None,
+    /// The record is shorter than this time.
     TooShort { least_s: f64 },
-    /// Half the sampling rate is too close to the resonance, or below it.
-    TooSlow { natural_hz: f64 },
+    /// Its rate is less than this.
+    TooSlow { least_hz: f64 },
     /// Its density has no peak there.
     NotExcited,
     /// Its density there is not that of a linear stand under a smooth torque.
@@ -73,24 +87,33 @@ pub enum Hidden {
 }
 
 impl Hidden {
+    /// The more telling one of two reasons.
+    fn or(self, other: Self) -> Self {
+        match self {
+            Self::NotExcited => other,
+            _ => self,
+        }
+    }
+
     /// The reason in words, with a remedy.
     pub fn text(self) -> String {
         match self {
+            Self::None => "the stand found has no resonance".to_owned(),
             Self::TooShort { least_s } => format!(
-                "the record is too short to resolve the resonance; record at least {} s",
-                rounded(least_s, 2)
+                "the record is too short to resolve it; record at least {} s",
+                rounded(ROUNDED_UP * least_s, 2)
             ),
-            Self::TooSlow { natural_hz } => format!(
-                "the sampling rate is too low for a resonance at {} Hz",
-                rounded(natural_hz, 4)
+            Self::TooSlow { least_hz } => format!(
+                "the sampling rate is too low; record at {} Hz or more",
+                rounded(ROUNDED_UP * least_hz, 2)
             ),
             Self::NotExcited => {
-                "besides lines and noise nothing shows a resonance near that of the stand; record while the speed rises \
-                 through it, or with a rougher torque"
+                "apart from lines and noise, the record shows no resonance near that of the stand; record while the speed \
+                 rises through it, or with a rougher torque"
                     .to_owned()
             }
             Self::NotSmooth => {
-                "around the resonance the record is not that of a linear stand under a smooth torque: lines, a rough \
+                "around it, the record does not look like that of a linear stand under a smooth torque: lines, a rough \
                  torque, or an effect that depends on the size of the motion; record at another speed, with less torque, \
                  or while the speed rises evenly"
                     .to_owned()
@@ -110,9 +133,13 @@ pub fn resonance(
     others_hz: &[f64],
 ) -> Result<OperatingResonance, Hidden> {
     let natural_hz = expected.natural_frequency_hz();
-    let half_hz = expected.damping_ratio * natural_hz;
-    if natural_hz + half_hz > HIGHEST * rate_hz {
-        return Err(Hidden::TooSlow { natural_hz });
+    if expected.damping_ratio > MOST_DAMPED || natural_hz <= 0.0 {
+        return Err(Hidden::None);
+    }
+    let half_hz = half_bandwidth_hz(expected);
+    let least_hz = (natural_hz + half_hz) / HIGHEST;
+    if rate_hz < least_hz {
+        return Err(Hidden::TooSlow { least_hz });
     }
     let samples = &samples[..samples.len().min(LONGEST)];
     let least_s = PER_HALF_BANDWIDTH[1] / half_hz;
@@ -121,7 +148,32 @@ pub fn resonance(
     }
     let clear = clear_of(others_hz, natural_hz, HIGHEST * rate_hz);
     let found = |taper| found_with(samples, rate_hz, taper, &clear, expected);
-    found(TAPERS[0]).or_else(|first| found(TAPERS[1]).map_err(|_| first))
+    found(TAPERS[0]).or_else(|first| found(TAPERS[1]).map_err(|other| first.or(other)))
+}
+
+/// The strongest lines of a steady speed in a running record: frequency in Hz and amplitude.
+pub fn steady_lines(
+    samples: &[f64],
+    rate_hz: f64,
+    expected: &Mode,
+    found: Option<&OperatingResonance>,
+) -> Vec<[f64; 2]> {
+    let samples = &samples[..samples.len().min(LONGEST)];
+    let all = Periodogram::of(samples, rate_hz, TAPERS[1]);
+    let density = found.map(|found| &found.density);
+    let lines = all.steady_lines(half_bandwidth_hz(expected), density);
+    let amplitudes = lines
+        .into_iter()
+        .map(|[hz, power]| [hz, 2.0 * power.sqrt()]);
+    let mut lines: Vec<[f64; 2]> = amplitudes.collect();
+    sort_by_number(&mut lines, |line| -line[1]);
+    lines.truncate(MOST_LINES);
+    lines
+}
+
+/// Half-bandwidth `ζ f₀` with which a record is searched.
+fn half_bandwidth_hz(mode: &Mode) -> f64 {
+    mode.damping_ratio.max(LEAST_DAMPED) * mode.natural_frequency_hz()
 }
 
 /// The same with a taper of the ends, in a range clear of other modes.
@@ -134,17 +186,19 @@ fn found_with(
 ) -> Result<OperatingResonance, Hidden> {
     let mut all = Periodogram::of(samples, rate_hz, taper);
     let natural_hz = expected.natural_frequency_hz();
-    let half_hz = expected.damping_ratio * natural_hz;
-    let lines = all.above_median(half_hz);
-    all.leave_out(&lines, half_hz);
+    let half_hz = half_bandwidth_hz(expected);
+    all.leave_out_lines(half_hz, None);
     let [from, to] = SEARCHED.map(|part| part * natural_hz);
     let searched = all.points(&within(from..to, clear), half_hz);
     let first = searched.search(half_hz).ok_or(Hidden::NotExcited)?;
-    let by_reach = REACHES.map(|reach| all.confirmed(first.clone(), reach, clear, half_hz));
-    let widest = by_reach
-        .into_iter()
-        .reduce(|wider, narrower| wider.or(narrower));
-    widest.unwrap_or(Err(Hidden::NotExcited))
+    let mut hidden = Hidden::NotExcited;
+    for reach in REACHES {
+        match all.confirmed(first.clone(), reach, clear, half_hz) {
+            Ok(found) => return Ok(found),
+            Err(why) => hidden = hidden.or(why),
+        }
+    }
+    Err(hidden)
 }
 
 fn within(range: Range<f64>, clear: &Range<f64>) -> Range<f64> {
@@ -174,44 +228,54 @@ impl Periodogram {
         clear: &Range<f64>,
         width_hz: f64,
     ) -> Result<OperatingResonance, Hidden> {
-        let steady = self.above_median(width_hz);
         let mut points = MeanLines(Vec::new());
+        let mut density = None;
         for _ in 0..ROUNDS {
             let (natural_hz, half_hz) = (fit.values[0].exp(), fit.half_hz());
             let from = (natural_hz - reach * half_hz).max(WIDEST[0] * natural_hz);
             let to = (natural_hz + reach * half_hz).min(WIDEST[1] * natural_hz);
-            let range = within(from..to, clear);
-            let both = steady.iter().zip(self.above(&fit.values, &range));
-            let lines: Vec<bool> = both.map(|(one, other)| *one || other).collect();
-            self.leave_out(&lines, width_hz);
-            points = self.points(&range, half_hz);
+            let present = density.insert(DensityInRange {
+                values: fit.values,
+                range_hz: within(from..to, clear),
+            });
+            self.leave_out_lines(width_hz, Some(present));
+            points = self.points(&present.range_hz, half_hz);
             let next = points.fit(resonant, fit.values);
-            let least_hz = PER_HALF_BANDWIDTH[1] * self.step_hz;
-            let next = next.filter(|fit| fit.is_resonance() && fit.half_hz() > least_hz);
+            let next = next.filter(DensityFit::is_resonance);
             fit = next.ok_or(Hidden::NotExcited)?;
+            let least_s = PER_HALF_BANDWIDTH[1] / fit.half_hz();
+            if least_s * self.step_hz > 1.0 {
+                // What is much narrower than the resonance expected is a chance peak.
+                let is_near = fit.half_hz() > NARROWEST * width_hz;
+                return Err(match is_near {
+                    true => Hidden::TooShort { least_s },
+                    false => Hidden::NotExcited,
+                });
+            }
         }
         let correlated = self.correlated();
-        let start =
-            DensityParameters::from([fit.values[0], 0.0, points.mean_power().ln(), 0.0, 0.0]);
+        let level = points.mean_power().ln();
+        let start = DensityParameters::from([fit.values[0], 0.0, level, 0.0, 0.0]);
         let plain = points.fit(smooth, start).ok_or(Hidden::NotExcited)?;
         if plain.objective - fit.objective < CLEAR * correlated {
             return Err(Hidden::NotExcited);
         }
-        let (deviation, excess) = points.deviation(&fit.values, correlated);
-        if deviation > DEVIATES {
+        let deviation = points.deviation(&fit.values, correlated);
+        if deviation.rms > DEVIATES && !deviation.is_by_chance {
             return Err(Hidden::NotSmooth);
         }
-        let covariance = fit.information.try_inverse().ok_or(Hidden::NotExcited)?;
+        let factors = fit.information.cholesky().ok_or(Hidden::NotExcited)?;
+        let covariance = factors.inverse() * (correlated * deviation.variance);
         let estimate = |unit: &'static str, k: usize| {
             let value = fit.values[k].exp();
-            let std = (correlated * excess * covariance[(k, k)]).sqrt();
-            Estimate::of(unit, value, Some(value * std))
+            Estimate::of(unit, value, Some(value * covariance[(k, k)].sqrt()))
         };
         let ends = [points.0.first(), points.0.last()];
         Ok(OperatingResonance {
             natural_frequency: estimate("Hz", 0),
             damping_ratio: estimate("", 1),
             range_hz: ends.map(|point| point.map_or(0.0, |point| point.frequency_hz)),
+            density: density.ok_or(Hidden::NotExcited)?,
         })
     }
 }

@@ -5,23 +5,78 @@ use std::ops::Range;
 
 use torqcomp_dsp::quality::median;
 
-use super::density::{DensityParameters, resonant};
+use super::density::{DensityInRange, resonant};
 
 /// Mean lines per half-bandwidth `ζ f₀`: wanted, and fewest.
 pub const PER_HALF_BANDWIDTH: [f64; 2] = [16.0, 6.0];
-/// Power over the density above which a line is that of a steady speed: noise is above once in 100,000.
+/// Power over the density above which a line is that of a steady speed: noise is above once in 100,000, and once in 10,000
+/// if the density is the median of as few lines as a block has at least.
 const UNUSUAL: f64 = 11.5;
+const FEWEST: usize = 24;
+/// The same for lines that are reported, and the lines on each side with the power of one.
+const REPORTED: f64 = 25.0;
+const LOBE: usize = 2;
 /// Fewest lines left out on each side of one, and the largest leakage in the others relative to the median around them.
 const BESIDE: usize = 3;
 const LEAKING: f64 = 0.1;
 
-/// Power of a record at each frequency.
+/// Power of a record at each frequency, in units of which `a²/4` is a sine of amplitude `a`.
 pub struct Periodogram {
     pub step_hz: f64,
     taper: f64,
     power: Vec<f64>,
     /// Whether each counts: it is no line of a steady speed.
     counts: Vec<bool>,
+}
+
+/// A line of a steady speed that leaks into those around it.
+struct Leaking {
+    power: f64,
+    taper: f64,
+}
+
+impl Leaking {
+    /// Most power this many lines away, from the square of `sin(πn(1 − t)) cos(πnt)/(πn(1 − (2nt)²))` with the taper `t`; the
+    /// line itself has `(1 − t)²`.
+    fn power(&self, lines: usize) -> f64 {
+        let lines = lines as f64;
+        let tapered = (2.0 * self.taper * lines).powi(2) - 1.0;
+        self.power * (PI * lines * tapered.max(1.0)).powi(-2)
+    }
+
+    /// Number of lines, up to `most`, in which it is more than the rest may have. `block` gives for a line this far away
+    /// the median around it, and the last line for which that holds.
+    fn reach(&self, most: usize, block: impl Fn(usize) -> (f64, usize)) -> usize {
+        let mut reach = BESIDE.min(most);
+        while reach < most {
+            let (median, last) = block(reach + 1);
+            let last = last.min(most);
+            let is_less = |away: usize| self.power(away) <= LEAKING * median;
+            if is_less(reach + 1) {
+                break;
+            }
+            reach = match is_less(last) {
+                true => (reach + 1..last)
+                    .take_while(|away| !is_less(*away))
+                    .last()
+                    .unwrap_or(reach),
+                false => last,
+            };
+        }
+        reach
+    }
+}
+
+/// Ranges of adjacent lines that are far above the noise.
+fn runs(over_noise: &[f64]) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for k in (0..over_noise.len()).filter(|k| over_noise[*k] > UNUSUAL) {
+        match runs.last_mut() {
+            Some(run) if run.end == k => run.end += 1,
+            _ => runs.push(k..k + 1),
+        }
+    }
+    runs
 }
 
 /// Mean power of adjacent lines.
@@ -49,7 +104,9 @@ impl Periodogram {
         let mut spectrum = plan.make_output_vec();
         // Cannot fail: the lengths match the plan.
         let _ = plan.process(&mut windowed, &mut spectrum);
-        let power: Vec<f64> = spectrum.iter().map(|line| line.norm_sqr()).collect();
+        let windows = 1.0 - 2.0 * taper * (1.0 - 3.0 / 8.0);
+        let scale = 1.0 / (windows * (count as f64).powi(2));
+        let power: Vec<f64> = spectrum.iter().map(|x| scale * x.norm_sqr()).collect();
         Self {
             step_hz: rate_hz / count as f64,
             taper,
@@ -65,14 +122,6 @@ impl Periodogram {
         (1.0 - tapered * (1.0 - 35.0 / 128.0)) / (1.0 - tapered * (1.0 - 3.0 / 8.0)).powi(2)
     }
 
-    /// Most power that a line has this many lines away, relative to its own: the square of
-    /// `sin(πn(1 − t)) cos(πnt)/(πn(1 − (2nt)²))` with the taper `t`.
-    fn leakage(&self, lines: usize) -> f64 {
-        let lines = lines as f64;
-        let tapered = (2.0 * self.taper * lines).powi(2) - 1.0;
-        (PI * lines * tapered.max(1.0)).powi(-2)
-    }
-
     pub fn frequency_hz(&self, k: usize) -> f64 {
         k as f64 * self.step_hz
     }
@@ -84,50 +133,72 @@ impl Periodogram {
 
     /// Median of the power in each block of a width in Hz, and the number of lines in it.
     fn medians(&self, width_hz: f64) -> (Vec<f64>, usize) {
-        let length = self.lines(width_hz).max(2 * BESIDE);
+        let length = self.lines(width_hz).max(FEWEST);
         let blocks = self.power.chunks(length);
         let middle = |block: &[f64]| median(&mut block.to_vec()).unwrap_or(0.0);
         (blocks.map(middle).collect(), length)
     }
 
-    /// Whether each line is far above the median of those within a width in Hz.
-    pub fn above_median(&self, width_hz: f64) -> Vec<bool> {
+    /// Power of each line over that of noise: over a density in a range, elsewhere over the median within a width in Hz.
+    fn over_noise(&self, width_hz: f64, density: Option<&DensityInRange>) -> Vec<f64> {
         let (medians, length) = self.medians(width_hz);
-        let is_above = |k: usize| self.power[k] > UNUSUAL / LN_2 * medians[k / length];
-        (0..self.power.len()).map(is_above).collect()
-    }
-
-    /// The same for lines far above a density in a range.
-    pub fn above(&self, values: &DensityParameters, range_hz: &Range<f64>) -> Vec<bool> {
-        let is_above = |k: usize| {
+        let over = |k: usize| {
             let frequency_hz = self.frequency_hz(k);
-            range_hz.contains(&frequency_hz)
-                && self.power[k] > UNUSUAL * resonant(values, frequency_hz).0.exp()
+            let inside = density.filter(|density| density.range_hz.contains(&frequency_hz));
+            self.power[k]
+                / match inside {
+                    Some(density) => resonant(&density.values, frequency_hz).0.exp(),
+                    None => medians[k / length] / LN_2,
+                }
         };
-        (0..self.power.len()).map(is_above).collect()
+        (0..self.power.len()).map(over).collect()
     }
 
-    /// Leaves out lines of a steady speed, and those around each that its leakage reaches, compared with the median
+    /// The lines of a steady speed: frequency and power of each.
+    pub fn steady_lines(&self, width_hz: f64, density: Option<&DensityInRange>) -> Vec<[f64; 2]> {
+        let over = self.over_noise(width_hz, density);
+        let runs = runs(&over).into_iter().filter(|run| {
+            let most = over[run.clone()].iter().copied().fold(0.0, f64::max);
+            run.start >= FEWEST && most > REPORTED
+        });
+        let line = |run: Range<usize>| {
+            let whole = run.start - LOBE..(run.end + LOBE).min(over.len());
+            let power: f64 = self.power[whole.clone()].iter().sum();
+            let moment = whole.map(|k| self.frequency_hz(k) * self.power[k]);
+            [moment.sum::<f64>() / power, power]
+        };
+        runs.map(line).collect()
+    }
+
+    /// Leaves out the lines of a steady speed, and those around each that its leakage reaches, compared with the median
     /// within a width in Hz.
-    pub fn leave_out(&mut self, is_line: &[bool], width_hz: f64) {
+    pub fn leave_out_lines(&mut self, width_hz: f64, density: Option<&DensityInRange>) {
         let (medians, length) = self.medians(width_hz);
-        let count = is_line.len();
+        let count = self.power.len();
         self.counts = vec![true; count];
         // The mean.
         self.counts[..=BESIDE.min(count - 1)].fill(false);
-        let mut next = 0;
-        while let Some(from) = (next..count).find(|k| is_line[*k]) {
-            let to = (from..count).find(|k| !is_line[*k]).unwrap_or(count);
+        for Range {
+            start: from,
+            end: to,
+        } in runs(&self.over_noise(width_hz, density))
+        {
             // Between two lines, a peak is up to twice as high.
             let power = 2.0 * self.power[from..to].iter().sum::<f64>();
-            let is_reached = |away: usize, k: usize| {
-                away <= BESIDE || power * self.leakage(away) > LEAKING * medians[k / length]
+            let line = Leaking {
+                power,
+                taper: self.taper,
             };
-            let below = (1..=from).take_while(|away| is_reached(*away, from - away));
-            let above = (1..=count - to).take_while(|away| is_reached(*away, to - 1 + away));
-            let (below, above) = (below.count(), above.count());
+            let block = |k: usize| (medians[k / length], k % length);
+            let below = line.reach(from, |away| {
+                let (median, place) = block(from - away);
+                (median, away + place)
+            });
+            let above = line.reach(count - to, |away| {
+                let (median, place) = block(to - 1 + away);
+                (median, away + length - 1 - place)
+            });
             self.counts[from - below..to + above].fill(false);
-            next = to;
         }
     }
 
