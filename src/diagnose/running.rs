@@ -49,12 +49,12 @@ pub struct RunningCheck {
     /// The stand with the accepted effects, at small motions, compared with the stand in use; `null` as before.
     pub after: Option<ModeDifference>,
     /// The 12 strongest lines of a steady speed.
-    pub lines: Vec<SteadyLine>,
+    pub lines: Vec<RunningLine>,
 }
 
 /// A line of a steady speed.
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
-pub struct SteadyLine {
+pub struct RunningLine {
     /// Frequency in Hz.
     pub frequency_hz: f64,
     /// Amplitude in the unit of `error`.
@@ -122,7 +122,7 @@ impl Diagnosis {
         let lines = steady_lines(&record.measured, record.rate_hz, &expected, found.as_ref());
         let lines = lines
             .into_iter()
-            .map(|[frequency_hz, amplitude]| SteadyLine {
+            .map(|[frequency_hz, amplitude]| RunningLine {
                 frequency_hz,
                 amplitude: amplitude / unit,
             });
