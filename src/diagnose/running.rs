@@ -175,9 +175,10 @@ impl Diagnosis {
                 "running-differs",
                 format!(
                     "{}: in use, the stand has a natural frequency of {} Hz and a damping ratio of {}; the stand found has {} \
-                     Hz and {}. A torque compensated with the stand found is off by up to {} near the resonance: the \
-                     clamping, the temperature, the parts mounted or the size of the motion differ. Fit records taken \
-                     under the conditions of use",
+                     Hz and {}. A torque compensated with the stand found is off by up to {} near the resonance. Either \
+                     the clamping, the temperature, the parts mounted or the size of the motion differ: fit records \
+                     taken under the conditions of use. Or an order or another peak of the torque lies there: compare \
+                     with a record at another speed",
                     record.source,
                     shown(&found.natural_frequency),
                     shown(&found.damping_ratio),

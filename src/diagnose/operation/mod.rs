@@ -16,7 +16,6 @@ mod periodogram;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-use torqcomp_dsp::sort_by_number;
 use torqcomp_model::{Estimate, Mode};
 
 use crate::print::rounded;
@@ -42,12 +41,17 @@ const NARROWEST: f64 = 0.3;
 const LEAST_DAMPED: f64 = 1e-4;
 /// Maximum number of lines reported.
 const MOST_LINES: usize = 12;
+/// Amplitude relative to the largest sample up to which a line may be due to rounding.
+const ROUNDING: f64 = 1e-12;
 /// Factor that keeps a rounded minimum sufficient.
 const ROUNDED_UP: f64 = 1.05;
 /// Repetitions of fit and search for such lines.
 const ROUNDS: usize = 4;
 /// Least gain in log-likelihood over a density without a resonance.
 const CLEAR: f64 = 15.0;
+/// Least damping ratio relative to that expected, and the standard uncertainties by which it must be less: in use, a stand
+/// is hardly damped less, so that a narrower peak is that of a torque.
+const SHARPEST: (f64, f64) = (0.7, 3.0);
 /// Largest relative rms deviation of the density from the law beyond chance.
 const DEVIATES: f64 = 0.2;
 
@@ -63,6 +67,14 @@ pub struct OperatingResonance {
 }
 
 impl OperatingResonance {
+    /// Whether it is too sharp for this mode.
+    fn is_sharper_than(&self, mode: &Mode) -> bool {
+        let (part, times) = SHARPEST;
+        let less = part * mode.damping_ratio - self.damping_ratio.value();
+        let std = self.damping_ratio.std_uncertainty().unwrap_or(0.0);
+        less > times * std
+    }
+
     pub fn mode(&self) -> Mode {
         Mode {
             omega_rad_s: TAU * self.natural_frequency.value(),
@@ -113,8 +125,8 @@ impl Hidden {
                     .to_owned()
             }
             Self::NotSmooth => {
-                "around it, the record does not look like that of a linear stand under a smooth torque: lines, a rough \
-                 torque, or an effect that depends on the size of the motion; record at another speed, with less torque, \
+                "around it, the record does not look like that of a linear stand under a smooth torque: an order whose \
+                 speed varies, impacts, another peak of the torque, or an effect that depends on the size of the motion; record at another speed, with less torque, \
                  or while the speed rises evenly"
                     .to_owned()
             }
@@ -147,7 +159,13 @@ pub fn resonance(
         return Err(Hidden::TooShort { least_s });
     }
     let clear = clear_of(others_hz, natural_hz, HIGHEST * rate_hz);
-    let found = |taper| found_with(samples, rate_hz, taper, &clear, expected);
+    let found = |taper| {
+        let found = found_with(samples, rate_hz, taper, &clear, expected)?;
+        match found.is_sharper_than(expected) {
+            true => Err(Hidden::NotSmooth),
+            false => Ok(found),
+        }
+    };
     found(TAPERS[0]).or_else(|first| found(TAPERS[1]).map_err(|other| first.or(other)))
 }
 
@@ -161,14 +179,14 @@ pub fn steady_lines(
     let samples = &samples[..samples.len().min(LONGEST)];
     let all = Periodogram::of(samples, rate_hz, TAPERS[1]);
     let density = found.map(|found| &found.density);
-    let lines = all.steady_lines(half_bandwidth_hz(expected), density);
+    let lines = all.steady_lines(half_bandwidth_hz(expected), density, MOST_LINES);
+    let largest = samples.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let amplitudes = lines
         .into_iter()
         .map(|[hz, power]| [hz, 2.0 * power.sqrt()]);
-    let mut lines: Vec<[f64; 2]> = amplitudes.collect();
-    sort_by_number(&mut lines, |line| -line[1]);
-    lines.truncate(MOST_LINES);
-    lines
+    amplitudes
+        .filter(|line| line[1] > ROUNDING * largest)
+        .collect()
 }
 
 /// Half-bandwidth `ζ f₀` with which a record is searched.
@@ -338,7 +356,7 @@ mod tests {
                 let torques = (0..45_000).map(|i| torque() + 0.3 * lines(i));
                 let mut record = answer(torques, 566.4, ratio);
                 record.iter_mut().for_each(|x| *x += 0.2 * recorder());
-                let found = resonance(&record[5000..], RATE_HZ, &expected(0.02), &[]);
+                let found = resonance(&record[5000..], RATE_HZ, &expected(ratio), &[]);
                 let found = found.unwrap_or_else(|why| panic!("{ratio}, {seed}: {why:?}"));
                 let off = deviations(&found, 566.4, ratio);
                 for (sum, off) in squares.iter_mut().zip(off) {
@@ -361,7 +379,10 @@ mod tests {
         let mut recorder = noise(5);
         let mut record = answer((0..60_000).map(chirp), 610.0, 0.01);
         record.iter_mut().for_each(|x| *x += 0.01 * recorder());
-        let found = resonance(&record, RATE_HZ, &expected(0.02), &[]).expect("a resonance");
+        let found = resonance(&record, RATE_HZ, &expected(0.012), &[]).expect("a resonance");
+        // A peak that is much sharper than that of the stand is no resonance of it.
+        let sharp = resonance(&record, RATE_HZ, &expected(0.05), &[]);
+        assert_eq!(sharp.err(), Some(Hidden::NotSmooth));
         let [frequency, ratio] = [found.natural_frequency.value(), found.damping_ratio.value()];
         assert!((frequency / 610.0 - 1.0).abs() < 5e-4, "{frequency}");
         assert!((ratio / 0.01 - 1.0).abs() < 0.03, "{ratio}");

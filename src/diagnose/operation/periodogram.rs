@@ -4,6 +4,7 @@ use std::f64::consts::{LN_2, PI, TAU};
 use std::ops::Range;
 
 use torqcomp_dsp::quality::median;
+use torqcomp_dsp::sort_by_number;
 
 use super::density::{DensityInRange, resonant};
 
@@ -16,6 +17,8 @@ const FEWEST: usize = 24;
 /// The same for lines that are reported, and the lines on each side with the power of one.
 const REPORTED: f64 = 25.0;
 const LOBE: usize = 2;
+/// Power of a reported line over what a stronger one leaks at most.
+const OF_LEAKAGE: f64 = 10.0;
 /// Fewest lines left out on each side of one, and the largest leakage in the others relative to the median around them.
 const BESIDE: usize = 3;
 const LEAKING: f64 = 0.1;
@@ -154,8 +157,13 @@ impl Periodogram {
         (0..self.power.len()).map(over).collect()
     }
 
-    /// The lines of a steady speed: frequency and power of each.
-    pub fn steady_lines(&self, width_hz: f64, density: Option<&DensityInRange>) -> Vec<[f64; 2]> {
+    /// The strongest lines of a steady speed, up to `most`: frequency and power of each.
+    pub fn steady_lines(
+        &self,
+        width_hz: f64,
+        density: Option<&DensityInRange>,
+        most: usize,
+    ) -> Vec<[f64; 2]> {
         let over = self.over_noise(width_hz, density);
         let runs = runs(&over).into_iter().filter(|run| {
             let most = over[run.clone()].iter().copied().fold(0.0, f64::max);
@@ -167,7 +175,22 @@ impl Periodogram {
             let moment = whole.map(|k| self.frequency_hz(k) * self.power[k]);
             [moment.sum::<f64>() / power, power]
         };
-        runs.map(line).collect()
+        let mut lines: Vec<[f64; 2]> = runs.map(line).collect();
+        sort_by_number(&mut lines, |[_, power]| -power);
+        let mut found: Vec<[f64; 2]> = Vec::new();
+        for [hz, power] in lines {
+            let is_leaked = |[other_hz, power_there]: &[f64; 2]| {
+                let other = Leaking {
+                    power: OF_LEAKAGE * power_there,
+                    taper: self.taper,
+                };
+                power < other.power(self.lines((hz - other_hz).abs()))
+            };
+            if found.len() < most && !found.iter().any(is_leaked) {
+                found.push([hz, power]);
+            }
+        }
+        found
     }
 
     /// Leaves out the lines of a steady speed, and those around each that its leakage reaches, compared with the median
