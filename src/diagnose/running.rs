@@ -105,19 +105,19 @@ impl Diagnosis {
             Some(_) => Err(Hidden::None),
             None => resonance(&record.measured, record.rate_hz, &expected, &others),
         };
+        let found = found.map_err(Hidden::text);
         let warning = match &found {
             Ok(found) => self.differs(record, found),
             Err(hidden) => Some(Warning::new(
                 "resonance-hidden",
                 format!(
-                    "{} does not show the resonance of the stand in use: {}",
-                    record.source,
-                    hidden.text()
+                    "{} does not show the resonance of the stand in use: {hidden}",
+                    record.source
                 ),
             )),
         };
         let unit = self.context().units.per_printed;
-        let hidden = found.as_ref().err().map(|hidden| hidden.text());
+        let hidden = found.as_ref().err().cloned();
         let found = found.ok();
         let lines = steady_lines(&record.measured, record.rate_hz, &expected, found.as_ref());
         let lines = lines

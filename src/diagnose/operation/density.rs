@@ -203,9 +203,9 @@ impl MeanLines {
                 damped.set_diagonal(&(information.diagonal() * (1.0 + caution)));
                 let step = damped.cholesky().map(|factors| factors.solve(&gradient));
                 let next = step.map(|step| values + step);
-                let better = next.filter(|next| objective(next) <= present);
-                if let Some(next) = better {
-                    (values, present) = (next, objective(&next));
+                let next = next.map(|next| (next, objective(&next)));
+                if let Some(better) = next.filter(|(_, there)| *there <= present) {
+                    (values, present) = better;
                     caution = (0.1 * caution).max(LEAST_CAUTION);
                     break;
                 }

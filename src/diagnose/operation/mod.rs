@@ -45,7 +45,7 @@ const MOST_LINES: usize = 12;
 const ROUNDING: f64 = 1e-12;
 /// Factor that keeps a rounded minimum sufficient.
 const ROUNDED_UP: f64 = 1.05;
-/// Repetitions of fit and search for such lines.
+/// Repetitions of fit and search for lines of a steady speed.
 const ROUNDS: usize = 4;
 /// Least gain in log-likelihood over a density without a resonance.
 const CLEAR: f64 = 15.0;
@@ -126,8 +126,8 @@ impl Hidden {
             }
             Self::NotSmooth => {
                 "around it, the record does not look like that of a linear stand under a smooth torque: an order whose \
-                 speed varies, impacts, another peak of the torque, or an effect that depends on the size of the motion; record at another speed, with less torque, \
-                 or while the speed rises evenly"
+                 speed varies, impacts, another peak of the torque, or an effect that depends on the size of the motion; \
+                 record at another speed, with less torque, or while the speed rises evenly"
                     .to_owned()
             }
         }
@@ -177,9 +177,9 @@ pub fn steady_lines(
     found: Option<&OperatingResonance>,
 ) -> Vec<[f64; 2]> {
     let samples = &samples[..samples.len().min(LONGEST)];
-    let all = Periodogram::of(samples, rate_hz, TAPERS[1]);
+    let all = Periodogram::of(samples, rate_hz, TAPERS[1], half_bandwidth_hz(expected));
     let density = found.map(|found| &found.density);
-    let lines = all.steady_lines(half_bandwidth_hz(expected), density, MOST_LINES);
+    let lines = all.steady_lines(density, MOST_LINES);
     let largest = samples.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let amplitudes = lines
         .into_iter()
@@ -202,10 +202,10 @@ fn found_with(
     clear: &Range<f64>,
     expected: &Mode,
 ) -> Result<OperatingResonance, Hidden> {
-    let mut all = Periodogram::of(samples, rate_hz, taper);
     let natural_hz = expected.natural_frequency_hz();
     let half_hz = half_bandwidth_hz(expected);
-    all.leave_out_lines(half_hz, None);
+    let mut all = Periodogram::of(samples, rate_hz, taper, half_hz);
+    all.leave_out_lines(None);
     let [from, to] = SEARCHED.map(|part| part * natural_hz);
     let searched = all.points(&within(from..to, clear), half_hz);
     let first = searched.search(half_hz).ok_or(Hidden::NotExcited)?;
@@ -237,14 +237,14 @@ fn clear_of(others_hz: &[f64], natural_hz: f64, highest_hz: f64) -> Range<f64> {
 }
 
 impl Periodogram {
-    /// The resonance fitted in a range about itself, if the density follows the law there and has a peak; `width_hz` is the
-    /// width of the blocks with which lines are compared.
+    /// The resonance fitted in a range about itself, if the density follows the law there and has a peak; `expected_hz` is
+    /// the half-bandwidth that is expected.
     fn confirmed(
         &mut self,
         mut fit: DensityFit,
         reach: f64,
         clear: &Range<f64>,
-        width_hz: f64,
+        expected_hz: f64,
     ) -> Result<OperatingResonance, Hidden> {
         let mut points = MeanLines(Vec::new());
         let mut density = None;
@@ -256,7 +256,7 @@ impl Periodogram {
                 values: fit.values,
                 range_hz: within(from..to, clear),
             });
-            self.leave_out_lines(width_hz, Some(present));
+            self.leave_out_lines(Some(present));
             points = self.points(&present.range_hz, half_hz);
             let next = points.fit(resonant, fit.values);
             let next = next.filter(DensityFit::is_resonance);
@@ -264,7 +264,7 @@ impl Periodogram {
             let least_s = PER_HALF_BANDWIDTH[1] / fit.half_hz();
             if least_s * self.step_hz > 1.0 {
                 // What is much narrower than the resonance expected is a chance peak.
-                let is_near = fit.half_hz() > NARROWEST * width_hz;
+                let is_near = fit.half_hz() > NARROWEST * expected_hz;
                 return Err(match is_near {
                     true => Hidden::TooShort { least_s },
                     false => Hidden::NotExcited,

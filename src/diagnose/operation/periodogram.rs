@@ -7,6 +7,7 @@ use torqcomp_dsp::quality::median;
 use torqcomp_dsp::sort_by_number;
 
 use super::density::{DensityInRange, resonant};
+use crate::diagnose::residual_tests::without_mean;
 
 /// Mean lines per half-bandwidth `ζ f₀`: wanted, and fewest.
 pub const PER_HALF_BANDWIDTH: [f64; 2] = [16.0, 6.0];
@@ -30,6 +31,9 @@ pub struct Periodogram {
     power: Vec<f64>,
     /// Whether each counts: it is no line of a steady speed.
     counts: Vec<bool>,
+    /// Lines in a block, and the median power in each.
+    block: usize,
+    medians: Vec<f64>,
 }
 
 /// A line of a steady speed that leaks into those around it.
@@ -94,15 +98,17 @@ pub struct MeanLine {
 pub struct MeanLines(pub Vec<MeanLine>);
 
 impl Periodogram {
-    pub fn of(samples: &[f64], rate_hz: f64, taper: f64) -> Self {
+    /// Of a record with tapered ends; lines are compared with the median within blocks of a width in Hz.
+    pub fn of(samples: &[f64], rate_hz: f64, taper: f64, width_hz: f64) -> Self {
         let count = samples.len();
-        let mean = samples.iter().sum::<f64>() / count as f64;
         let window = |i: usize| {
             let from_end = (i.min(count - 1 - i) as f64 + 0.5) / (taper * count as f64);
             0.5 - 0.5 * (0.5 * TAU * from_end.min(1.0)).cos()
         };
-        let windowed = samples.iter().enumerate();
-        let mut windowed: Vec<f64> = windowed.map(|(i, x)| (x - mean) * window(i)).collect();
+        let mut windowed = without_mean(samples);
+        for (i, x) in windowed.iter_mut().enumerate() {
+            *x *= window(i);
+        }
         let plan = torqcomp_fourier::forward(count);
         let mut spectrum = plan.make_output_vec();
         // Cannot fail: the lengths match the plan.
@@ -110,10 +116,15 @@ impl Periodogram {
         let windows = 1.0 - 2.0 * taper * (1.0 - 3.0 / 8.0);
         let scale = 1.0 / (windows * (count as f64).powi(2));
         let power: Vec<f64> = spectrum.iter().map(|x| scale * x.norm_sqr()).collect();
+        let step_hz = rate_hz / count as f64;
+        let block = ((width_hz / step_hz) as usize).max(FEWEST);
+        let middle = |block: &[f64]| median(&mut block.to_vec()).unwrap_or(0.0);
         Self {
-            step_hz: rate_hz / count as f64,
+            step_hz,
             taper,
             counts: vec![true; power.len()],
+            block,
+            medians: power.chunks(block).map(middle).collect(),
             power,
         }
     }
@@ -134,37 +145,23 @@ impl Periodogram {
         ((width_hz / self.step_hz) as usize).max(1)
     }
 
-    /// Median of the power in each block of a width in Hz, and the number of lines in it.
-    fn medians(&self, width_hz: f64) -> (Vec<f64>, usize) {
-        let length = self.lines(width_hz).max(FEWEST);
-        let blocks = self.power.chunks(length);
-        let middle = |block: &[f64]| median(&mut block.to_vec()).unwrap_or(0.0);
-        (blocks.map(middle).collect(), length)
-    }
-
-    /// Power of each line over that of noise: over a density in a range, elsewhere over the median within a width in Hz.
-    fn over_noise(&self, width_hz: f64, density: Option<&DensityInRange>) -> Vec<f64> {
-        let (medians, length) = self.medians(width_hz);
+    /// Power of each line over that of noise: over a density in a range, elsewhere over the median of its block.
+    fn over_noise(&self, density: Option<&DensityInRange>) -> Vec<f64> {
         let over = |k: usize| {
             let frequency_hz = self.frequency_hz(k);
             let inside = density.filter(|density| density.range_hz.contains(&frequency_hz));
             self.power[k]
                 / match inside {
                     Some(density) => resonant(&density.values, frequency_hz).0.exp(),
-                    None => medians[k / length] / LN_2,
+                    None => self.medians[k / self.block] / LN_2,
                 }
         };
         (0..self.power.len()).map(over).collect()
     }
 
     /// The strongest lines of a steady speed, up to `most`: frequency and power of each.
-    pub fn steady_lines(
-        &self,
-        width_hz: f64,
-        density: Option<&DensityInRange>,
-        most: usize,
-    ) -> Vec<[f64; 2]> {
-        let over = self.over_noise(width_hz, density);
+    pub fn steady_lines(&self, density: Option<&DensityInRange>, most: usize) -> Vec<[f64; 2]> {
+        let over = self.over_noise(density);
         let runs = runs(&over).into_iter().filter(|run| {
             let most = over[run.clone()].iter().copied().fold(0.0, f64::max);
             run.start >= FEWEST && most > REPORTED
@@ -193,10 +190,9 @@ impl Periodogram {
         found
     }
 
-    /// Leaves out the lines of a steady speed, and those around each that its leakage reaches, compared with the median
-    /// within a width in Hz.
-    pub fn leave_out_lines(&mut self, width_hz: f64, density: Option<&DensityInRange>) {
-        let (medians, length) = self.medians(width_hz);
+    /// Leaves out the lines of a steady speed, and those around each that its leakage reaches, compared with the median of
+    /// their block.
+    pub fn leave_out_lines(&mut self, density: Option<&DensityInRange>) {
         let count = self.power.len();
         self.counts = vec![true; count];
         // The mean.
@@ -204,7 +200,7 @@ impl Periodogram {
         for Range {
             start: from,
             end: to,
-        } in runs(&self.over_noise(width_hz, density))
+        } in runs(&self.over_noise(density))
         {
             // Between two lines, a peak is up to twice as high.
             let power = 2.0 * self.power[from..to].iter().sum::<f64>();
@@ -212,14 +208,14 @@ impl Periodogram {
                 power,
                 taper: self.taper,
             };
-            let block = |k: usize| (medians[k / length], k % length);
+            let block = |k: usize| (self.medians[k / self.block], k % self.block);
             let below = line.reach(from, |away| {
                 let (median, place) = block(from - away);
                 (median, away + place)
             });
             let above = line.reach(count - to, |away| {
                 let (median, place) = block(to - 1 + away);
-                (median, away + length - 1 - place)
+                (median, away + self.block - 1 - place)
             });
             self.counts[from - below..to + above].fill(false);
         }
