@@ -258,8 +258,8 @@ impl Plan {
             NoiseAt {
                 frequency_hz,
                 gain,
-                relative_std: std.total.map(|u| u.magnitude_relative),
-                response_relative_std: std.response.map(|u| u.magnitude_relative),
+                relative_std: std.total.map(|u| u.complex_relative()),
+                response_relative_std: std.response.map(|u| u.complex_relative()),
             }
         };
         let top_hz = self.filter.band().top_hz();

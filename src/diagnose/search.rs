@@ -10,6 +10,7 @@ use torqcomp_model::fit::FitError;
 
 use super::blocks::{Comparison, family_p_values};
 use super::fit::{FitEffort, FittedModel, fit};
+use super::from_best::fit_from_best;
 use super::reason::{Reason, Status};
 use super::record::StandRecord;
 use super::records::Records;
@@ -91,7 +92,7 @@ const PROMINENT: f64 = 12.0;
 /// Reduction of the training sum of squares, in residual variances, below which a fit is not continued.
 const WORTHWHILE: f64 = 5.0;
 
-const FIRST_FIT: FitEffort = FitEffort::brief(3);
+pub const FIRST_FIT: FitEffort = FitEffort::brief(3);
 const SECOND_FIT: FitEffort = FitEffort::brief(5);
 const FULL_FIT: FitEffort = FitEffort::full(15);
 /// Maximum number of successive full fits, and ratio of successive sums of squares above which they end.
@@ -313,12 +314,13 @@ pub fn fit_all(
     });
     let promising = (fitted.train_sum, least);
     fit_special_cases(forms, &mut fits, promising, records, workers);
+    fit_from_best(base, forms, &mut fits, records, workers);
     fits
 }
 
 /// A fit continued while the error falls substantially: with light damping, small frequency errors accumulate, and
 /// convergence is slow at first.
-fn to_the_end(fit: &FittedModel, records: &Records) -> FittedModel {
+pub fn to_the_end(fit: &FittedModel, records: &Records) -> FittedModel {
     let mut best = fit.clone();
     for _ in 0..MOST_FULL_FITS {
         let Ok(next) = best.refit(&records.train, FULL_FIT) else {

@@ -138,7 +138,11 @@ fn own_values(effect: &EffectForm, lines: &[SpectralLine], scales: &RecordScales
 
 /// Reduces the stiffness of the plain stand by that of the effect, so that the total is unchanged; `present` is the
 /// added stiffness of the existing effects.
-fn with_shared_stiffness(structure: &Structure, present: f64, mut values: Vec<f64>) -> Vec<f64> {
+pub fn with_shared_stiffness(
+    structure: &Structure,
+    present: f64,
+    mut values: Vec<f64>,
+) -> Vec<f64> {
     let factor = (1.0 + structure.model(&values).0.added_stiffness()) / (1.0 + present);
     values[0] /= factor.sqrt();
     if structure.context.gain_is_free {

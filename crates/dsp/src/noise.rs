@@ -91,7 +91,7 @@ pub struct RecordNoise {
     pub recorded_rms: f64,
     /// Rms of the noise after compensation: `√(∫S₀ |W H⁻¹|² df)`.
     pub compensated_rms: f64,
-    /// Rms of the record within the band, without its mean, noise included.
+    /// Rms of the record within the band about its mean, noise included.
     pub in_band_rms: f64,
     /// Rms of the signal above the band without noise, in the band's edge as far as it is removed:
     /// `√(∫(S − S₀)(1 − W)² df)`.
@@ -101,13 +101,13 @@ pub struct RecordNoise {
 }
 
 impl RecordNoise {
-    /// Noise of a record with this density; `None` if there is too little room between the band and
+    /// Noise of a record with this density and rms about its mean; `None` if there is too little room between the band and
     /// the Nyquist frequency to see the floor, or the density there is zero.
     ///
     /// The noise is white, the same inside the band as above it, unless the record shows that it went through a low-pass
     /// (`noise_density`).
     #[must_use]
-    pub fn of(filter: &InverseFilter, density: &Density) -> Option<Self> {
+    pub fn of(filter: &InverseFilter, density: &Density, rms: f64) -> Option<Self> {
         let band = filter.band();
         let nyquist_hz = 0.5 * band.sample_rate_hz();
         // Avoids the window's leakage at the edge and the recorder's own filter at the far end.
@@ -136,19 +136,22 @@ impl RecordNoise {
             Some(filtered) => (filtered.level, filtered.range_hz),
             None => (white, [from_hz, to_hz]),
         };
+        // The first bins contain the mean, spread by the window. What is slower than a block, such as a ramp or a late
+        // step, is in the rms alone.
+        let of_band = |f: f64, v: f64| match f < 2.0 * density.step_hz {
+            true => 0.0,
+            false => v * band.gain(f).powi(2),
+        };
+        let outside: f64 = density
+            .between(band.top_hz(), nyquist_hz)
+            .map(|(f, v)| v * (1.0 - band.gain(f).powi(2)) * density.step_hz)
+            .sum();
         Some(Self {
             floor_per_root_hz: floor.sqrt(),
             floor_band_hz,
             recorded_rms: power(&|f, _| noise(f) * band.gain(f).powi(2)),
             compensated_rms: power(&|f, _| noise(f) * filter.response(f).norm_sqr()),
-            // The first bins contain the mean, spread by the window.
-            in_band_rms: power(&|f, v| {
-                if f < 2.0 * density.step_hz {
-                    0.0
-                } else {
-                    v * band.gain(f).powi(2)
-                }
-            }),
+            in_band_rms: power(&of_band).max((rms * rms - outside).max(0.0).sqrt()),
             above_band_rms: band.cut_off(density, to_hz, noise).max(0.0).sqrt(),
             lost_hz: lost_ranges(density, band.top_hz(), &noise),
         })
@@ -206,6 +209,7 @@ mod tests {
     use super::*;
     use crate::band::Band;
     use crate::compensate::whole_record;
+    use crate::dot::rms;
     use crate::spectrum::welch;
 
     const RATE: f64 = 20_000.0;
@@ -233,10 +237,6 @@ mod tests {
             .collect()
     }
 
-    fn rms(values: &[f64]) -> f64 {
-        (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
-    }
-
     #[test]
     fn stated_noise_is_what_noise_becomes() {
         let filter = filter(2400.0);
@@ -258,7 +258,7 @@ mod tests {
             .map(|(i, n)| n + 50.0 * (std::f64::consts::TAU * 120.0 * i as f64 / RATE).cos())
             .collect();
         let density = welch(&record, RATE, 4096).unwrap();
-        let stated = RecordNoise::of(&filter, &density).unwrap();
+        let stated = RecordNoise::of(&filter, &density, rms(&record)).unwrap();
         assert!((stated.floor_per_root_hz.powi(2) / (2.0 * 0.09 / RATE) - 1.0).abs() < 0.05);
         assert!(
             (stated.compensated_rms / measured - 1.0).abs() < 0.05,
@@ -276,7 +276,7 @@ mod tests {
         let filter = filter(2400.0);
         let record = white(0.01, 200_000);
         let density = welch(&record, RATE, 4096).unwrap();
-        let lost = RecordNoise::of(&filter, &density).unwrap();
+        let lost = RecordNoise::of(&filter, &density, rms(&record)).unwrap();
         assert_eq!(
             lost.lost_from_hz(2400.0),
             Some(0.0),
@@ -290,7 +290,7 @@ mod tests {
             .map(|(i, n)| n + (std::f64::consts::TAU * 50.0 * i as f64 / RATE).cos())
             .collect();
         let density = welch(&with_signal, RATE, 4096).unwrap();
-        let found = RecordNoise::of(&filter, &density).unwrap();
+        let found = RecordNoise::of(&filter, &density, rms(&with_signal)).unwrap();
         assert_eq!(
             found.lost_from_hz(2400.0),
             Some(100.0),
@@ -302,14 +302,17 @@ mod tests {
     #[test]
     fn a_signal_above_the_band_is_seen() {
         // The edge reaches from 2400 to 2880 Hz, with an amplitude of one half in its middle.
-        for (frequency_hz, rms) in [(5000.0, 2.0_f64.sqrt()), (2640.0, 0.5_f64.sqrt())] {
+        for (frequency_hz, expected) in [(5000.0, 2.0_f64.sqrt()), (2640.0, 0.5_f64.sqrt())] {
             let angle = |i: usize| std::f64::consts::TAU * frequency_hz * i as f64 / RATE;
             let noise = white(0.1, 100_000);
             let record = noise.iter().enumerate();
             let record: Vec<f64> = record.map(|(i, n)| n + 2.0 * angle(i).cos()).collect();
             let density = welch(&record, RATE, 4096).unwrap();
-            let found = RecordNoise::of(&filter(2400.0), &density).unwrap();
-            assert!((found.above_band_rms / rms - 1.0).abs() < 0.02, "{found:?}");
+            let found = RecordNoise::of(&filter(2400.0), &density, rms(&record)).unwrap();
+            assert!(
+                (found.above_band_rms / expected - 1.0).abs() < 0.02,
+                "{found:?}"
+            );
         }
     }
 
@@ -317,6 +320,6 @@ mod tests {
     fn no_room_above_the_band_is_no_estimate() {
         let filter = filter(9000.0);
         let density = welch(&white(1.0, 20_000), RATE, 4096).unwrap();
-        assert_eq!(RecordNoise::of(&filter, &density), None);
+        assert_eq!(RecordNoise::of(&filter, &density, 1.0), None);
     }
 }

@@ -2,10 +2,10 @@
 //! describes.
 
 use torqcomp_dsp::band::Band;
-use torqcomp_dsp::compensate::whole_record;
+use torqcomp_dsp::compensate::{InverseFilter, whole_record};
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::quality::streamed::StreamedFaults;
-use torqcomp_dsp::spectrum::{Density, PowerSum, StreamedPower};
+use torqcomp_dsp::spectrum::{PowerSum, StreamedPower};
 use torqcomp_dsp::store::SampleStore;
 
 use super::above::{AboveBand, power_above};
@@ -46,9 +46,7 @@ pub(super) fn run(
     let scale = 1.0 / chain.applied.factor;
     report.scale = scale;
     report.start = record.start;
-    if let Some(density) = density(&record, scale)? {
-        report.noise.record = RecordNoise::of(&filter, &density);
-    }
+    report.noise.record = noise(&record, &filter, scale)?;
     let mut sums = ResultSums::new(filter.half_length());
     let mut deliver = |first: usize, torque: &[f64], recorded: &[f64]| {
         sums.push(torque, &Sums::of(torque));
@@ -101,19 +99,27 @@ fn look_through(
     Ok(faults)
 }
 
-/// Power density of a record in printed units, if it is long enough.
-fn density(record: &UniformRecord<Spool>, scale: f64) -> Result<Option<Density>, Failure> {
+/// Noise of a record in printed units, if it is long enough.
+fn noise(
+    record: &UniformRecord<Spool>,
+    filter: &InverseFilter,
+    scale: f64,
+) -> Result<Option<RecordNoise>, Failure> {
     let count = record.samples.count();
     let block = ((count / 2).next_power_of_two() / 2).min(LONGEST_BLOCK);
     if block < 4 {
         return Ok(None);
     }
     let mut power = StreamedPower::new(block);
+    let mut sums = Sums::NONE;
     record.samples.pass(0..count, &mut |_, piece| {
         let printed: Vec<f64> = piece.iter().map(|x| x * scale).collect();
         power.push(&printed);
+        sums.join(&Sums::of(piece));
     })?;
-    Ok(power.density(record.rate_hz))
+    let density = power.density(record.rate_hz);
+    let rms = sums.statistics(scale).rms;
+    Ok(density.and_then(|density| RecordNoise::of(filter, &density, rms)))
 }
 
 /// Writes samples of the result from a given index on, with the recorded ones.

@@ -177,8 +177,8 @@ pub(super) struct NoiseAt {
     pub(super) frequency_hz: f64,
     /// `|torque / recorded torque|`.
     pub(super) gain: f64,
-    /// Relative standard uncertainty of the torque, from the stand's constants and the calibration; `null` if that of one
-    /// of them is unknown.
+    /// Relative standard uncertainty of the torque, of magnitude and phase together, from the stand's constants and the
+    /// calibration; `null` if that of one of them is unknown.
     pub(super) relative_std: Option<f64>,
     /// Part of `relative_std` from the response that is divided out; `null` if unknown.
     pub(super) response_relative_std: Option<f64>,
@@ -401,16 +401,7 @@ impl NoiseReport {
         let points: Vec<String> = self
             .gain
             .iter()
-            .map(|g| {
-                let std = g.relative_std.map_or_else(String::new, |std| {
-                    format!(" ± {} %", rounded(100.0 * std, 2))
-                });
-                format!(
-                    "{}{std} at {} Hz",
-                    rounded(g.gain, 3),
-                    short(g.frequency_hz)
-                )
-            })
+            .map(|g| format!("{} at {} Hz", rounded(g.gain, 3), short(g.frequency_hz)))
             .collect();
         points.join(", ")
     }

@@ -44,7 +44,8 @@ struct Job {
     power: Option<PowerSum>,
     /// Mean square of the record above the band.
     above: Option<f64>,
-    sums: Option<Sums>,
+    /// Of the result, and of the record.
+    sums: Option<[Sums; 2]>,
 }
 
 /// Processing of each sample, the same on every thread.
@@ -68,6 +69,7 @@ struct Gathered<'a> {
     power: PowerSum,
     above: AboveBand,
     sums: ResultSums,
+    recorded: Sums,
     /// The first samples as recorded: for the quality of the record, and for its noise where it is too short for a
     /// block of the estimate.
     first: Vec<f64>,
@@ -147,6 +149,7 @@ impl<'a> Gathered<'a> {
             power: PowerSum::new(steps.noise_block),
             above,
             sums: ResultSums::new(steps.half_length),
+            recorded: Sums::NONE,
             first: Vec::new(),
             faults: StreamedFaults::default(),
         }
@@ -167,8 +170,9 @@ impl<'a> Gathered<'a> {
             let range = [job.first, job.first + job.torque.len()];
             self.above.take(power, range);
         }
-        if let Some(part) = &job.sums {
-            self.sums.push(&job.torque, part);
+        if let Some([result, recorded]) = &job.sums {
+            self.sums.push(&job.torque, result);
+            self.recorded.join(recorded);
         }
         self.faults.push(recorded);
         let missing = excerpt::OF_STREAM - self.first.len();
@@ -183,7 +187,8 @@ impl<'a> Gathered<'a> {
         report.result = self.sums.statistics(steps.scale);
         if let Some(density) = self.density(steps.rate_hz) {
             let density = density.scaled(steps.scale * steps.scale);
-            report.noise.record = RecordNoise::of(filter, &density);
+            let rms = self.recorded.statistics(steps.scale).rms;
+            report.noise.record = RecordNoise::of(filter, &density, rms);
         }
         report.warnings.extend(self.above.warning(report));
     }
@@ -304,7 +309,7 @@ impl Steps<'_> {
             power.add_samples(&job.window[self.half_length..self.half_length + length]);
         }
         job.above = self.watched.and_then(|band| power_above(power, band));
-        job.sums = Some(Sums::of(&job.torque));
+        job.sums = Some([&job.torque[..], self.recorded(&job.window)].map(Sums::of));
         job.text.clear();
         if !self.is_text {
             return;

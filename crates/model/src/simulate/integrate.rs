@@ -8,6 +8,7 @@
 use num_complex::Complex64;
 
 use super::between::Between;
+use super::modes::seen;
 use crate::effects::Mode;
 use crate::modal::{ModalPart, ModalResponse};
 
@@ -42,16 +43,13 @@ pub fn substeps(natural_hz: f64, rate_hz: f64) -> usize {
 
 /// One step of the linear part.
 pub(super) struct LinearStep {
-    /// `x ← a x + b x'`, `x' ← c x + d x'`.
-    pub(super) a: f64,
-    b: f64,
-    pub(super) c: f64,
-    d: f64,
+    /// What a unit of `x` and one of `x'` become in `x` and `x'`.
+    pub(super) of_x: [f64; 2],
+    of_speed: [f64; 2],
     /// Whether the input is constant from a node to the next.
     is_held: bool,
-    /// Contributions of the input at the nodes −1, 0, 1, 2 to `x` and `x'`.
-    to_x: [f64; 4],
-    to_speed: [f64; 4],
+    /// What a unit of the input at each of the nodes −1, 0, 1, 2 adds to `x` and `x'`.
+    of_input: [[f64; 2]; 4],
 }
 
 /// Free motion over a time: the matrix exponential of the linear part.
@@ -107,44 +105,52 @@ impl LinearStep {
         if between == Between::Held {
             // For a constant input, the distance to the equilibrium decays like the free motion.
             return Self {
-                a,
-                b,
-                c,
-                d,
+                of_x: [a, c],
+                of_speed: [b, d],
                 is_held: true,
-                to_x: [0.0, gain * (1.0 - a), 0.0, 0.0],
-                to_speed: [0.0, -gain * c, 0.0, 0.0],
+                of_input: [[0.0; 2], [gain * (1.0 - a), -gain * c], [0.0; 2], [0.0; 2]],
             };
         }
-        let mut to_x = [0.0; 4];
-        let mut to_speed = [0.0; 4];
+        let mut of_input = [[0.0; 2]; 4];
         for (place, weight) in GAUSS {
             let [_, x, _, speed] = free(mode, (1.0 - place) * step_s);
             let force = weight * step_s * gain * mode.omega_rad_s * mode.omega_rad_s;
-            for (node, share) in cubic(place).into_iter().enumerate() {
-                to_x[node] += force * x * share;
-                to_speed[node] += force * speed * share;
+            for ([to_x, to_speed], share) in of_input.iter_mut().zip(cubic(place)) {
+                *to_x += force * x * share;
+                *to_speed += force * speed * share;
             }
         }
         Self {
-            a,
-            b,
-            c,
-            d,
+            of_x: [a, c],
+            of_speed: [b, d],
             is_held: false,
-            to_x,
-            to_speed,
+            of_input,
         }
     }
 
+    /// The step of a mode's contribution to the motion of the gage.
+    pub(super) fn seen(mut self, part: &ModalPart) -> Self {
+        for [x, speed] in &mut self.of_input {
+            let driven = MotionState {
+                x: *x,
+                speed: *speed,
+            };
+            let both = seen(part, driven);
+            (*x, *speed) = (both.x, both.speed);
+        }
+        self
+    }
+
+    /// The state at the next node; both numbers in the same operations, which a processor does at once.
     #[inline]
     pub(super) fn advance(&self, state: MotionState, input: &[f64]) -> MotionState {
-        let force =
-            |w: &[f64; 4]| w[0] * input[0] + w[1] * input[1] + w[2] * input[2] + w[3] * input[3];
-        MotionState {
-            x: self.a * state.x + (self.b * state.speed + force(&self.to_x)),
-            speed: self.c * state.x + (self.d * state.speed + force(&self.to_speed)),
-        }
+        let [u, v, w, z] = *input.first_chunk().expect("four nodes");
+        let [to_u, to_v, to_w, to_z] = self.of_input;
+        let [x, speed] = std::array::from_fn(|k| {
+            let force = to_u[k] * u + to_v[k] * v + to_w[k] * w + to_z[k] * z;
+            self.of_x[k] * state.x + (self.of_speed[k] * state.speed + force)
+        });
+        MotionState { x, speed }
     }
 }
 

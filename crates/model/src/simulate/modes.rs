@@ -5,84 +5,63 @@
 //! y_k'' + 2ζ_k ω_k y_k' + ω_k² y_k = ω_k² G u,   z_k'' + 2ζ_k ω_k z_k' + ω_k² z_k = −ω_k² g_k n(x, x')
 //! ```
 //!
-//! `y_k` is driven by the input and `z_k` by the torques `n` at the gage; both are exact from node to node. A torque
+//! `y_k` is driven by the input and `z_k` by the torques `n` at the gage. Both move alike between the nodes, so that one
+//! state per mode has them both: `v_k = r_k y_k + q_k y_k'/ω_k + z_k` and its rate, in which `q_k ω_k G u` is left out, as
+//! it follows the input without a state. The steps are exact from node to node. A torque
 //! changes the speed of the gage at a node, and that of each `z_k` by its contribution `ω_k² g_k`. Sharp dry friction
 //! is constant over a step: as much as stops the gage at its end, but no more than its magnitude (J. J. Moreau,
 //! *Numerical aspects of the sweeping process*, Comput. Methods Appl. Mech. Eng. 177 (1999), 329).
 
 use super::input::Excitation;
-use super::integrate::{LinearStep, MotionState, free};
+use super::integrate::{LinearStep, MotionState};
 use super::run::{Acting, MotionProgress, kicked, remembered, shown};
 use super::side_by_side::{OngoingMotion, Stepped};
 use crate::modal::{ModalPart, ModalResponse};
 
-/// State of a mode.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct ModeMotion {
-    /// `y`.
-    driven: MotionState,
-    /// `z`.
-    pushed: MotionState,
-}
-
 /// Initial states of the modes of a stand: the mode with the largest static contribution has all of the motion. Empty
 /// for a stand with one mode.
-pub(super) fn begin(stand: &ModalResponse, start: MotionState) -> Vec<ModeMotion> {
+pub(super) fn begin(stand: &ModalResponse, start: MotionState) -> Vec<MotionState> {
     if stand.only().is_some() {
         return Vec::new();
     }
-    let mut modes = vec![ModeMotion::default(); stand.parts().len()];
+    let mut modes = vec![MotionState::default(); stand.parts().len()];
     let parts = stand.parts().iter().enumerate();
     let largest = parts.max_by(|a, b| a.1.residue.abs().total_cmp(&b.1.residue.abs()));
     if let Some((place, part)) = largest.filter(|(_, part)| part.residue != 0.0) {
-        modes[place].driven = MotionState {
+        let driven = MotionState {
             x: start.x / part.residue,
             speed: start.speed / part.residue,
         };
+        modes[place] = seen(part, driven);
     }
     modes
 }
 
-/// A mode with its integration step.
-struct SteppedMode {
-    part: ModalPart,
-    step: LinearStep,
-    free: [f64; 4],
-    /// `g`; 0 where no torque acts.
-    at_gage: f64,
-    motion: ModeMotion,
+/// Contribution of a mode's own motion to displacement and speed of the gage, without that of the present input.
+pub(super) fn seen(part: &ModalPart, driven: MotionState) -> MotionState {
+    let ModalPart {
+        mode,
+        residue,
+        quadrature,
+        ..
+    } = *part;
+    let omega = mode.omega_rad_s;
+    MotionState {
+        x: residue * driven.x + quadrature / omega * driven.speed,
+        speed: (residue - 2.0 * mode.damping_ratio * quadrature) * driven.speed
+            - quadrature * omega * driven.x,
+    }
 }
 
-impl SteppedMode {
-    /// Advances by a step; returns its contribution to displacement and speed of the gage, with `driving`
-    /// being `G u` at the end.
-    fn advance(&mut self, window: &[f64], driving: f64) -> MotionState {
-        self.motion.driven = self.step.advance(self.motion.driven, window);
-        let MotionState { x, speed } = self.motion.pushed;
-        let [a, b, c, d] = self.free;
-        self.motion.pushed = MotionState {
-            x: a * x + b * speed,
-            speed: c * x + d * speed,
-        };
-        self.at(driving)
-    }
-
-    /// Its contribution to displacement and speed of the gage.
-    fn at(&self, driving: f64) -> MotionState {
-        let ModeMotion { driven, pushed } = self.motion;
-        let (omega, ratio) = (self.part.mode.omega_rad_s, self.part.mode.damping_ratio);
-        let turned = self.part.quadrature / omega;
-        let rate = omega * omega * (driving - driven.x) - 2.0 * ratio * omega * driven.speed;
-        MotionState {
-            x: self.part.residue * driven.x + turned * driven.speed + pushed.x,
-            speed: self.part.residue * driven.speed + turned * rate + pushed.speed,
-        }
-    }
-
+/// A mode with its integration step.
+struct SteppedMode {
+    step: LinearStep,
+    /// `g`; 0 where no torque acts.
+    at_gage: f64,
     /// `ω² g`: acceleration by a unit torque at the gage.
-    fn pushed_by(&self) -> f64 {
-        self.part.mode.omega_rad_s * self.part.mode.omega_rad_s * self.at_gage
-    }
+    pushed_by: f64,
+    /// `v` and its rate.
+    motion: MotionState,
 }
 
 /// Integration state of a stand with several modes.
@@ -90,7 +69,8 @@ pub(super) struct ModalIntegrator<'a> {
     modes: Vec<SteppedMode>,
     /// `c G`.
     direct: f64,
-    gain: f64,
+    /// `Σ q_k ω_k G`: the gage's speed per input.
+    direct_speed: f64,
     shift: f64,
     step_s: f64,
     /// Change of the gage's speed at a node by a unit torque.
@@ -107,41 +87,36 @@ impl<'a> Stepped<'a> for ModalIntegrator<'a> {
         window: &[f64],
     ) -> (Self, MotionState) {
         let (gain, step_s) = (motion.gain, input.step_s());
-        let stepped = |(part, at): (&ModalPart, &ModeMotion)| SteppedMode {
-            part: *part,
-            step: LinearStep::new(&part.mode, gain, step_s, input.between()),
-            free: free(&part.mode, step_s),
+        let stepped = |(part, at): (&ModalPart, &MotionState)| SteppedMode {
+            step: LinearStep::new(&part.mode, gain, step_s, input.between()).seen(part),
             at_gage: part.at_gage.unwrap_or(0.0),
+            pushed_by: part.mode.omega_rad_s.powi(2) * part.at_gage.unwrap_or(0.0),
             motion: *at,
         };
         let parts = motion.stand.parts().iter();
         let modes: Vec<SteppedMode> = parts.zip(&motion.progress.modes).map(stepped).collect();
+        let turned = |part: &ModalPart| part.quadrature * part.mode.omega_rad_s;
         let memories = motion.progress.memories.iter().copied();
         let run = Self {
-            impulse: step_s * modes.iter().map(SteppedMode::pushed_by).sum::<f64>(),
+            impulse: step_s * modes.iter().map(|mode| mode.pushed_by).sum::<f64>(),
             modes,
             direct: motion.stand.residual() * gain,
-            gain,
+            direct_speed: gain * motion.stand.parts().iter().map(turned).sum::<f64>(),
             shift: motion.shift,
             step_s,
             acting: motion.torques.iter().copied().zip(memories).collect(),
             dry: motion.torques.iter().filter_map(|(t, _)| t.dry()).sum(),
         };
-        let state = run.begin(window);
+        let state = run.whole(&window[..3]);
         (run, state)
     }
 
     /// Advances by a step and applies the torques at its end.
     fn step(&mut self, state: MotionState, window: &[f64]) -> MotionState {
-        let driving = self.gain * window[2];
-        let mut parts = std::mem::take(&mut self.modes);
-        let advanced = parts.iter_mut().map(|mode| mode.advance(window, driving));
-        let moved = self.whole(
-            advanced,
-            window[2],
-            (window[3] - window[1]) / (2.0 * self.step_s),
-        );
-        self.modes = parts;
+        for mode in &mut self.modes {
+            mode.motion = mode.step.advance(mode.motion, window);
+        }
+        let moved = self.whole(&window[1..]);
         let kicked = self.kick(moved, moved.speed - state.speed);
         self.rub(kicked)
     }
@@ -159,25 +134,16 @@ impl<'a> Stepped<'a> for ModalIntegrator<'a> {
 }
 
 impl ModalIntegrator<'_> {
-    /// Displacement and speed of the gage at the initial node.
-    fn begin(&self, window: &[f64]) -> MotionState {
-        let parts = self.modes.iter().map(|mode| mode.at(self.gain * window[1]));
-        self.whole(
-            parts,
-            window[1],
-            (window[2] - window[0]) / (2.0 * self.step_s),
-        )
-    }
-
-    /// Sum over all modes and the compliance above the band.
-    fn whole(&self, parts: impl Iterator<Item = MotionState>, u: f64, slope: f64) -> MotionState {
+    /// Displacement and speed of the gage at the middle one of three nodes: all modes, and the compliance above the band.
+    fn whole(&self, nodes: &[f64]) -> MotionState {
+        let slope = (nodes[2] - nodes[0]) / (2.0 * self.step_s);
         let direct = MotionState {
-            x: self.direct * u,
-            speed: self.direct * slope,
+            x: self.direct * nodes[1],
+            speed: self.direct * slope + self.direct_speed * nodes[1],
         };
-        parts.fold(direct, |sum, part| MotionState {
-            x: sum.x + part.x,
-            speed: sum.speed + part.speed,
+        self.modes.iter().fold(direct, |sum, mode| MotionState {
+            x: sum.x + mode.motion.x,
+            speed: sum.speed + mode.motion.speed,
         })
     }
 
@@ -186,7 +152,7 @@ impl ModalIntegrator<'_> {
         if kicked.speed != moved.speed {
             let each = (kicked.speed - moved.speed) * self.step_s / self.impulse;
             for mode in &mut self.modes {
-                mode.motion.pushed.speed += each * mode.pushed_by();
+                mode.motion.speed += each * mode.pushed_by;
             }
         }
         kicked
@@ -200,17 +166,16 @@ impl ModalIntegrator<'_> {
         let stops: f64 = self
             .modes
             .iter()
-            .map(|mode| -mode.at_gage * mode.free[2])
+            .map(|mode| -mode.at_gage * mode.step.of_x[1])
             .sum();
         let friction = (moved.speed / stops).clamp(-self.dry, self.dry);
         for mode in &mut self.modes {
-            let [a, _, c, _] = mode.free;
             let (x, speed) = (
-                -mode.at_gage * friction * (1.0 - a),
-                mode.at_gage * friction * c,
+                -mode.at_gage * friction * (1.0 - mode.step.of_x[0]),
+                mode.at_gage * friction * mode.step.of_x[1],
             );
-            mode.motion.pushed.x += x;
-            mode.motion.pushed.speed += speed;
+            mode.motion.x += x;
+            mode.motion.speed += speed;
             moved.x += x;
             moved.speed += speed;
         }

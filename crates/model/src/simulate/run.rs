@@ -2,7 +2,7 @@
 
 use super::input::Excitation;
 use super::integrate::{LinearStep, MotionState, free};
-use super::modes::{self, ModeMotion};
+use super::modes;
 use super::side_by_side::{OngoingMotion, Stepped};
 use crate::effects::{Memory, Mode, Torque};
 use crate::modal::ModalResponse;
@@ -34,12 +34,12 @@ pub(crate) struct MotionProgress {
     pub(super) memories: Vec<Memory>,
     direction: f64,
     /// State of each mode, if there are several.
-    pub(super) modes: Vec<ModeMotion>,
+    pub(super) modes: Vec<MotionState>,
 }
 
 impl MotionProgress {
     /// The state of a stand with several modes.
-    pub(super) fn of_modes(memories: Vec<Memory>, modes: Vec<ModeMotion>) -> Self {
+    pub(super) fn of_modes(memories: Vec<Memory>, modes: Vec<MotionState>) -> Self {
         Self {
             state: MotionState::default(),
             memories,
@@ -188,8 +188,8 @@ impl Integrator<'_> {
         let friction = -self.dry * self.direction;
         let linear = self.step.advance(state, window);
         let moved = MotionState {
-            x: linear.x + friction * (1.0 - self.step.a),
-            speed: linear.speed - friction * self.step.c,
+            x: linear.x + friction * (1.0 - self.step.of_x[0]),
+            speed: linear.speed - friction * self.step.of_x[1],
         };
         let moved = self.kick(moved, moved.speed - state.speed);
         if moved.speed * self.direction > 0.0 {
