@@ -214,3 +214,28 @@ fn a_late_pulse_above_the_band_is_said() {
         assert!(!ran.stderr.contains("signal-above-band"), "{}", ran.stderr);
     }
 }
+
+/// A ramp, and a quiet record that ends with a step: slower than the blocks of a density.
+#[test]
+fn a_slow_torque_is_part_of_the_record() {
+    let count = 200_000;
+    let shapes: [fn(f64) -> f64; 2] =
+        [|part| 5.0 * part, |part| if part < 0.9 { 0.0 } else { 3.0 }];
+    for (shape, rms) in shapes
+        .into_iter()
+        .zip([5.0 / 12_f64.sqrt(), 3.0 * 0.09_f64.sqrt()])
+    {
+        let mut noise = Noise(17);
+        let mut sample = |i: usize| shape(i as f64 / count as f64) + 1e-3 * noise.normal();
+        let samples: Vec<f64> = (0..count).map(&mut sample).collect();
+        let folder = Folder::new();
+        folder.write("in.csv", record(&samples, RATE));
+        let ran = folder.run(&compensate("in.csv"));
+        for code in ["mostly-amplified", "signal-above-band"] {
+            assert!(!ran.stderr.contains(code), "{}", ran.stderr);
+        }
+        let report: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+        let found = report["noise"]["record"]["in_band_rms"].as_f64().unwrap();
+        assert!((found / rms - 1.0).abs() < 0.01, "{found} {rms}");
+    }
+}

@@ -457,3 +457,51 @@ fn the_example_gives_back_the_torque_that_went_in() {
         / 6000.0;
     assert!(ringing.sqrt() > 40.0 * rms, "{}", ringing.sqrt() / rms);
 }
+
+/// Divided by a stand whose frequency is one standard uncertainty off, a sine at the resonance keeps its amplitude and
+/// changes its phase: |δG/G| = 2 u(f)/f / (2 ζ) = 2/590/0.02.
+#[test]
+fn a_wrong_phase_is_part_of_the_uncertainty() {
+    let folder = Folder::new();
+    let stand = |hz: f64, std: &str| {
+        format!(
+            "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = {{ value = \"{hz} Hz\"{std} }}\n\
+             damping_ratio = 0.02\n"
+        )
+    };
+    folder.write("stand.toml", stand(590.0, ", std = \"2 Hz\""));
+    folder.write("other.toml", stand(592.0, ""));
+    let sine = |i: usize| (std::f64::consts::TAU * 590.0 * i as f64 / 20_000.0).sin();
+    let rows = (0..40_000).map(|i| format!("{},{}\n", i as f64 / 20_000.0, sine(i)));
+    let text = "time_s,torque_n_m\n".to_owned() + &rows.collect::<String>();
+    folder.write("in.csv", text);
+    let torque = |name: &str, more: &[&str]| {
+        let args = ["compensate", "in.csv", "--stand", name, "--band", "900"];
+        let ran = folder.run(&[&args[..], more].concat());
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        ran.stdout
+    };
+    let [one, other] = ["stand.toml", "other.toml"]
+        .map(|name| column(&torque(name, &["-q"]), "compensated_torque_n_m"));
+    let inside = 10_000..30_000;
+    let square = |value: fn(f64, f64) -> f64| -> f64 {
+        inside
+            .clone()
+            .map(|i| value(one[i], other[i]).powi(2))
+            .sum()
+    };
+    let relative = (square(|a, b| a - b) / square(|a, _| a)).sqrt();
+    let report = torque("stand.toml", &["--json", "-o", "out.csv"]);
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let stated = report["noise"]["largest_std"]["relative_std"]
+        .as_f64()
+        .unwrap();
+    assert!(
+        (stated / (2.0 / 590.0 / 0.02) - 1.0).abs() < 0.01,
+        "{stated}"
+    );
+    assert!(
+        (stated / relative - 1.0).abs() < 0.05,
+        "{stated} {relative}"
+    );
+}

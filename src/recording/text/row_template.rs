@@ -169,6 +169,9 @@ impl Shape {
             }
             end += 4;
         }
+        if !(1..=LONGEST_RUN).contains(&whole) || whole + fraction > MOST_DIGITS {
+            return None;
+        }
         let first = fraction.min(LONGEST_RUN);
         let shape = Self {
             whole,
@@ -176,8 +179,7 @@ impl Shape {
             runs: [first, fraction - first].map(Run::of),
             exponent,
         };
-        ((1..=LONGEST_RUN).contains(&whole) && whole + fraction <= MOST_DIGITS)
-            .then_some((shape, end))
+        Some((shape, end))
     }
 
     /// The number at `at` if it has this format, and its end. The character there is not checked, as
@@ -306,6 +308,9 @@ mod tests {
         assert!(!follows("0.00,1.5e-03\n0.01,1.5e-3\n"));
         assert!(!follows("0.00,1.5\n0.01;1.5\n"));
         assert!(!follows("0,1.000000000000000\n1,1.000000000000000\n"));
+        // Ten to the power of their number is no integer of 64 bits.
+        let long = format!("0,0.{:030}\n", 1);
+        assert!(!follows(&long.repeat(2)));
         assert!(!follows("0.00,nan\n0.01,nan\n"));
         // A number continues before an unwanted column.
         assert!(!follows("0.00,1.5,7\n0.01,2.55,7\n"));
