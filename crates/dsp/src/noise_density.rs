@@ -7,8 +7,6 @@
 //! is the lower quartile of `P − T|H|²`. Below the resonance the noise is taken to be the same, which is too little if the
 //! corner of the low-pass is below it, too; above, it is no larger than the smooth part of the record.
 
-use std::f64::consts::PI;
-
 use crate::compensate::Inverse;
 use crate::quality::median;
 use crate::spectrum::Density;
@@ -29,13 +27,9 @@ const FEWEST: usize = 32;
 /// Minimum noise, relative to the record beside the peak and to the white floor.
 const OF_RECORD: f64 = 0.5;
 const OF_WHITE: f64 = 2.0;
-/// Largest leakage of the window in a line that counts, relative to the record there.
-const LEAKAGE: f64 = 0.1;
 /// Minimum noise, relative to the largest density of the record: what is less can be skirts of lines whose amplitude
 /// varies.
 const SKIRTS: f64 = 1e-7;
-/// Distance from which leakage is far below the line it comes from.
-const FAR: usize = 4;
 /// Largest mean density at the peak, relative to the median beside it.
 const FLAT: f64 = 3.0;
 /// Lines whose quartile is the smooth part of the record.
@@ -117,8 +111,7 @@ fn filtered(density: &Density, white: f64, inverse: &Inverse) -> Option<Filtered
     let [from, to] = AROUND.map(|part| (part * peak as f64) as usize);
     let to = to.min((HIGHEST * record.len() as f64) as usize);
     let beside = (from..to)
-        .filter(|line| line.abs_diff(peak) > reach && response[*line] <= BESIDE * response[peak])
-        .filter(|line| leakage(record, *line) <= LEAKAGE * record[*line]);
+        .filter(|line| line.abs_diff(peak) > reach && response[*line] <= BESIDE * response[peak]);
     let beside: Vec<usize> = beside.collect();
     if beside.len() < FEWEST {
         return None;
@@ -141,16 +134,6 @@ fn filtered(density: &Density, white: f64, inverse: &Inverse) -> Option<Filtered
         range_hz,
         peak,
     })
-}
-
-/// What the window lets through to a line from steady lines elsewhere, at most: of a line at a distance of `d` steps,
-/// `(4/(π d (d² − 1)(d² − 4)))²` of its peak.
-fn leakage(record: &[f64], line: usize) -> f64 {
-    let from = |(other, power): (usize, &f64)| {
-        let d = other.abs_diff(line).max(FAR) as f64;
-        power * (4.0 / (PI * d * (d * d - 1.0) * (d * d - 4.0))).powi(2)
-    };
-    record.iter().enumerate().map(from).sum()
 }
 
 /// Lower quartile of some values.
