@@ -222,11 +222,11 @@ fn the_charts_of_a_compensation_show_what_was_computed() {
         .run(&compensate(&["-o", "torque.csv", "--html", "page.html"]))
         .says(0, &[]);
     let page = folder.read("page.html");
-    // A line of amplitude a in a sin⁴ window of 4096 samples at 5 kHz has the mean square a²/2, and at its centre the
-    // density a²/2 / (1.944 Δf): 3 N m at 40 Hz, which is 0.23 bins off (−0.18 dB of its power).
+    // A line of amplitude a in a Hann window of 4096 samples at 5 kHz has the mean square a²/2, and at its centre the
+    // density a²/2 / (1.5 Δf): 3 N m at 40 Hz, which is 0.23 bins off (−0.08 dB of its power).
     let (x, y) = highest(&page, "Amplitude spectral density", 1);
     let step_hz: f64 = 5000.0 / 4096.0;
-    let density = (4.5 / (1.944 * step_hz)).sqrt();
+    let density = (4.5 / (1.5 * step_hz)).sqrt();
     assert!(
         (10_f64.powf(x) - 40.0).abs() < step_hz,
         "{}",

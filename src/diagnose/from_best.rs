@@ -1,7 +1,7 @@
 //! Fits of other effects from where the best one ended.
 //!
-//! With several modes, a frequency that is 1 % wrong adds up to turns over a record, and the fit of the right effect may
-//! get stuck there, while another bends the spring alike and arrives near the right frequencies. From those, the right
+//! With several modes, a frequency that is 1 % wrong adds up to whole cycles over a record, and the fit of the right effect may
+//! get stuck there, while another changes the spring alike and arrives near the right frequencies. From those, the right
 //! effect needs no more than its own magnitude.
 
 use super::fit::{FittedModel, fit};
@@ -22,7 +22,7 @@ const STUCK: f64 = 2.0;
 /// Magnitudes that are tried, relative to the starts of a form.
 const MAGNITUDES: [f64; 4] = [1.0, 0.3, 0.1, 0.03];
 /// Number of forms that are fitted, those with the smallest residuals at their starts.
-const FITTED: usize = 8;
+const RETRIED: usize = 8;
 
 /// Refits the forms of the first effect beside several modes that got stuck far above the best fit, if that one reduces
 /// the sum of squares substantially.
@@ -43,17 +43,19 @@ pub fn fit_from_best(
         None => fitted.train_sum,
     };
     let best = fits.iter().min_by(|a, b| sum(a).total_cmp(&sum(b)));
-    let best = best.and_then(|best| best.as_ref()).cloned();
-    let is_close = |best: &ScoredModel| best.fitted.train_sum <= CLOSE * fitted.train_sum;
+    let best = best
+        .and_then(|best| best.as_ref())
+        .map(|best| best.fitted.clone());
+    let is_close = |best: &FittedModel| best.train_sum <= CLOSE * fitted.train_sum;
     let Some(best) = best.filter(is_close) else {
         return;
     };
-    let Some(near) = Near::of(&best.fitted, records) else {
+    let Some(near) = Near::of(&best, records) else {
         return;
     };
     let is_stuck = |k: &usize| {
         let is_allowed = near.structure.context.allows(&forms[*k]);
-        let is_far = sum(&fits[*k]) > STUCK * best.fitted.train_sum;
+        let is_far = sum(&fits[*k]) > STUCK * best.train_sum;
         forms[*k].form.stage == Stage::Stand && is_allowed && is_far
     };
     let stuck: Vec<usize> = (0..forms.len()).filter(is_stuck).collect();
@@ -63,7 +65,7 @@ pub fn fit_from_best(
     let starts = starts.into_iter().zip(stuck);
     let mut starts: Vec<_> = starts.filter_map(|(start, k)| Some((start?, k))).collect();
     sort_by_number(&mut starts, |((left, _), _)| *left);
-    starts.truncate(FITTED);
+    starts.truncate(RETRIED);
     let found = parallel(starts.len(), workers.threads, |i| {
         let ((_, start), k) = &starts[i];
         near.fit(forms[*k], start, records)
@@ -75,13 +77,16 @@ pub fn fit_from_best(
     }
 }
 
-/// The stand at the best fit.
+/// The neighbourhood of the best fit.
 struct Near<'a> {
     best: &'a FittedModel,
-    /// Its structure without the effect, the values of that, and the added stiffness with the effect.
+    /// Its structure without the effect.
     structure: Structure,
+    /// Values of that.
     plain: &'a [f64],
+    /// Stiffness that the effect adds.
     present: f64,
+    /// The training records with its initial states.
     training: Vec<StandRecord>,
 }
 
@@ -105,6 +110,7 @@ impl<'a> Near<'a> {
         let there = to_the_end(&first, records);
         let from_rest = FittedModel {
             initial: vec![InitialState::default(); there.initial.len()],
+            train_sum: f64::INFINITY,
             ..there.clone()
         };
         let anew = to_the_end(&from_rest, records);
@@ -115,7 +121,7 @@ impl<'a> Near<'a> {
         ScoredModel::of(less, records)
     }
 
-    /// The start of another form with the smallest sum of squares, after it.
+    /// Sum of squares and values of the best start of another form.
     fn start(&self, form: EffectForm) -> Option<(f64, Vec<f64>)> {
         let structure = self.structure.with(form);
         let size = form.size();

@@ -27,8 +27,6 @@ const HIGHEST_FRACTION: f64 = 0.96;
 const FALLBACK_FRACTION: f64 = 0.7;
 /// Nodes of the table from which the edge is interpolated.
 const EDGE_NODES: usize = 1024;
-/// Half-width of a line in a density, in steps.
-const LOBE: f64 = 3.0;
 
 /// The stated band of a compensation at one sampling rate.
 #[derive(Debug, Clone, PartialEq)]
@@ -133,8 +131,7 @@ impl Band {
         1.0 - EDGE.at(x)
     }
 
-    /// Mean square that the band removes from a record up to a frequency, without its noise: `∫(S − N) (1 − W)² df`,
-    /// without the first three lines above it, into which a line of the band reaches.
+    /// Mean square that the band removes from a record up to a frequency, without its noise: `∫(S − N) (1 − W)² df`.
     ///
     /// ```
     /// use torqcomp_dsp::{band::Band, spectrum::Density};
@@ -149,7 +146,7 @@ impl Band {
     /// ```
     pub fn cut_off(&self, density: &Density, to_hz: f64, noise: impl Fn(f64) -> f64) -> f64 {
         density
-            .between(self.top_hz + LOBE * density.step_hz, to_hz)
+            .between(self.top_hz, to_hz)
             .map(|(f, v)| (v - noise(f)) * (1.0 - self.gain(f)).powi(2) * density.step_hz)
             .sum()
     }

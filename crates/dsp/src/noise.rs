@@ -91,7 +91,7 @@ pub struct RecordNoise {
     pub recorded_rms: f64,
     /// Rms of the noise after compensation: `√(∫S₀ |W H⁻¹|² df)`.
     pub compensated_rms: f64,
-    /// Rms of the record within the band about its mean, noise included.
+    /// Rms of the record's part within the band, without the mean, noise included.
     pub in_band_rms: f64,
     /// Rms of the signal above the band without noise, in the band's edge as far as it is removed:
     /// `√(∫(S − S₀)(1 − W)² df)`.
@@ -101,7 +101,7 @@ pub struct RecordNoise {
 }
 
 impl RecordNoise {
-    /// Noise of a record with this density and rms about its mean; `None` if there is too little room between the band and
+    /// Noise of a record with this density, and this rms about its mean; `None` if there is too little room between the band and
     /// the Nyquist frequency to see the floor, or the density there is zero.
     ///
     /// The noise is white, the same inside the band as above it, unless the record shows that it went through a low-pass

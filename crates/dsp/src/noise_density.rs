@@ -27,9 +27,8 @@ const FEWEST: usize = 32;
 /// Minimum noise, relative to the record beside the peak and to the white floor.
 const OF_RECORD: f64 = 0.5;
 const OF_WHITE: f64 = 2.0;
-/// Minimum noise, relative to the largest density of the record: what is less can be skirts of lines whose amplitude
-/// varies.
-const SKIRTS: f64 = 1e-7;
+/// Minimum noise, relative to the largest density of the record: what is less can be leakage of the window.
+const LEAKAGE: f64 = 1e-7;
 /// Largest mean density at the peak, relative to the median beside it.
 const FLAT: f64 = 3.0;
 /// Lines whose quartile is the smooth part of the record.
@@ -126,7 +125,7 @@ fn filtered(density: &Density, white: f64, inverse: &Inverse) -> Option<Filtered
     let level = noise / density.quantile_over_mean(QUARTILE);
     let is_flat = at_peak <= FLAT * middle * (2 * reach + 1) as f64;
     let largest = record.iter().copied().fold(0.0, f64::max);
-    let least = (OF_WHITE * white).max(SKIRTS * largest);
+    let least = (OF_WHITE * white).max(LEAKAGE * largest);
     let is_noise = is_flat && noise > OF_RECORD * low && level > least;
     let range_hz = [from, to].map(|line| line as f64 * density.step_hz);
     is_noise.then_some(FilteredNoise {

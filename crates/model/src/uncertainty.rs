@@ -88,8 +88,8 @@ pub struct InverseUncertainty {
 }
 
 impl InverseUncertainty {
-    /// Of the complex value `G`, as a fraction of its magnitude: `√E|δG/G|² = √(u²(ln|G|) + u²(φ))`. It is the rms error
-    /// of a compensated sine over that sine, since a shift of its phase is an error of its samples, too.
+    /// Of the complex inverse `G`, as a fraction of its magnitude: `√(u²(ln|G|) + u²(φ))`. To first order it is the rms
+    /// error of the samples of a compensated sine, relative to their rms.
     ///
     /// ```
     /// // Magnitude 3 % and phase 0.04 rad: 5 %.

@@ -36,7 +36,8 @@ pub(super) struct PageData {
 struct GainPoint {
     frequency_hz: f64,
     gain: f64,
-    relative_std: Option<f64>,
+    /// Of the gain alone, without the phase.
+    gain_relative_std: Option<f64>,
 }
 
 impl PageData {
@@ -52,7 +53,7 @@ impl PageData {
             GainPoint {
                 frequency_hz,
                 gain: plan.filter.response(frequency_hz).norm(),
-                relative_std: std.total.or(std.response).map(|u| u.magnitude_relative),
+                gain_relative_std: std.total.or(std.response).map(|u| u.magnitude_relative),
             }
         };
         Ok(Self {
@@ -148,7 +149,7 @@ impl PageData {
         let points = |p: &GainPoint| (p.frequency_hz, p.gain);
         let gain = Series::new("gain", self.gain.iter().map(points).collect());
         let bounds = |p: &GainPoint| {
-            let spread = 2.0 * p.relative_std? * p.gain;
+            let spread = 2.0 * p.gain_relative_std? * p.gain;
             Some((p.frequency_hz, p.gain - spread, p.gain + spread))
         };
         let band: Vec<_> = self.gain.iter().filter_map(bounds).collect();

@@ -180,7 +180,7 @@ pub(super) struct NoiseAt {
     /// Relative standard uncertainty of the torque, of magnitude and phase together, from the stand's constants and the
     /// calibration; `null` if that of one of them is unknown.
     pub(super) relative_std: Option<f64>,
-    /// Part of `relative_std` from the response that is divided out; `null` if unknown.
+    /// Part of `relative_std` from the response that is divided out, of magnitude and phase together; `null` if unknown.
     pub(super) response_relative_std: Option<f64>,
 }
 

@@ -1,7 +1,7 @@
 //! End of the band of a compensated record; everything above it was filtered out.
 
 use torqcomp_dsp::quality::median;
-use torqcomp_dsp::spectrum::{Density, welch};
+use torqcomp_dsp::spectrum::{Density, welch_steep};
 use torqcomp_dsp::store::SampleStore;
 
 use super::speed::highest;
@@ -33,7 +33,7 @@ pub(super) fn warning(
     // A block of the spectrum has an even length.
     let count = record.samples.count().min(MOST) & !1;
     let samples = record.samples.part(0..count).ok()?;
-    let density = welch(&samples, record.rate_hz, count).ok()?;
+    let density = welch_steep(&samples, record.rate_hz, count).ok()?;
     let top_hz = top(&density, 0.5 * record.rate_hz)?;
     let is_beyond = |order: &&f64| *order * fundamental_hz > NEAR * top_hz;
     let beyond = orders.iter().filter(is_beyond);

@@ -24,7 +24,7 @@ use super::{Band, EDGE, Edge, FALLBACK_FRACTION};
 use crate::compensate::Inverse;
 use crate::noise_density::NoiseDensity;
 use crate::quality::quantisation::quantisation;
-use crate::spectrum::{Density, welch};
+use crate::spectrum::{Density, welch_steep};
 
 /// Grid frequencies per decade.
 const PER_DECADE: i32 = 96;
@@ -95,7 +95,7 @@ impl BandSearch {
             return None;
         }
         let block = (longest_here / 2 + 1).next_power_of_two().min(longest);
-        let density = welch(samples, rate_hz, block).ok()?;
+        let density = welch_steep(samples, rate_hz, block).ok()?;
         let mut search = Self::of_density(&density, rate_hz, inverse)?;
         if let Some(found) = quantisation(samples) {
             search.count_rounding(found.step.powi(2) / 12.0);

@@ -120,7 +120,7 @@ impl BlockConvolver {
             if available == length
                 && let Some(power) = power.as_deref_mut()
             {
-                power.add_transform(&self.spectrum);
+                power.add_hann(&self.spectrum);
             }
             for (bin, gain) in self.spectrum.iter_mut().zip(self.kernel.iter()) {
                 *bin *= gain;

@@ -18,8 +18,8 @@ const SHORTEST_S: f64 = 1.0;
 const MOST_BLOCKS: usize = 32;
 /// Relative tolerance of the mains frequency: 0.1 Hz at 50 Hz, exceeded by grids only for seconds.
 const OFF: f64 = 0.002;
-/// Half-width of a line in bins with the window of the spectrum.
-const LOBE: usize = 4;
+/// Half-width of a line in bins with a Hann window.
+const LOBE: usize = 3;
 /// Number of bins beyond that, on either side, that a line must exceed.
 const BESIDE: usize = 14;
 /// Minimum power of a line relative to the highest of the neighbouring bins.
@@ -66,7 +66,7 @@ pub struct MainsLine {
 /// Looks for mains lines in a uniformly sampled record. `None` if there are none, or if the record is too short (1
 /// s), too slow (the mains must lie below 0.45 of the rate) or contains no whole block of finite samples.
 ///
-/// Welch's method with blocks of 2 s (at least 1 s), over which grids keep their frequency within a bin. A bin
+/// Welch's method with Hann windows of 2 s (at least 1 s), over which grids keep their frequency within a bin. A bin
 /// within 0.2 % and half a bin of a multiple is a line if it is higher than its neighbours and at least 6 times as
 /// high as the highest of the 14 bins on either side beyond the window's own width. For locally white noise, the
 /// false-alarm probability of one transform is `∏ j/(j+6), j = 1…28` = 7·10⁻⁷ per bin (ratio of an exponential
@@ -77,7 +77,7 @@ pub struct MainsLine {
 /// A line of another origin can lie at 50 Hz as well: a mains-fed motor, or a shaft at a fraction of it. It cannot
 /// be distinguished from mains if it is closer than the resolution.
 ///
-/// The amplitude is `√(2 Σ(S − S₀) Δf)` over the 7 bins about the line, `S₀` being the median of the neighbouring
+/// The amplitude is `√(2 Σ(S − S₀) Δf)` over the 5 bins about the line, `S₀` being the median of the neighbouring
 /// bins.
 ///
 /// ```
@@ -183,7 +183,7 @@ fn line(density: &Density, nominal_hz: f64, order: usize) -> Option<MainsLine> {
     let mut beside = beside(density, bin)?;
     let highest = beside.iter().copied().fold(0.0, f64::max);
     let floor = median(&mut beside)?;
-    let power: f64 = density.values[bin + 1 - LOBE..bin + LOBE]
+    let power: f64 = density.values[bin - 2..=bin + 2]
         .iter()
         .map(|s| (s - floor) * density.step_hz)
         .sum();

@@ -19,7 +19,7 @@ const NEAR: [f64; 2] = [0.4, 2.5];
 const BLOCKS: usize = 7;
 /// Number of block lengths, each half of the previous one; the longest resolves a sixteenth of the declared width.
 const RESOLUTIONS: u32 = 4;
-/// Minimum half-power bandwidth, in steps of the spectrum: a line has 1.9.
+/// Minimum half-power bandwidth, in steps of the spectrum: a line with a Hann window has 1.4.
 const BROAD: f64 = 4.0;
 /// Maximum half-power bandwidth, relative to the frequency.
 const WIDEST: f64 = 0.2;

@@ -8,7 +8,6 @@
 use num_complex::Complex64;
 
 use super::between::Between;
-use super::modes::seen;
 use crate::effects::Mode;
 use crate::modal::{ModalPart, ModalResponse};
 
@@ -44,7 +43,7 @@ pub fn substeps(natural_hz: f64, rate_hz: f64) -> usize {
 /// One step of the linear part.
 pub(super) struct LinearStep {
     /// What a unit of `x` and one of `x'` become in `x` and `x'`.
-    pub(super) of_x: [f64; 2],
+    of_x: [f64; 2],
     of_speed: [f64; 2],
     /// Whether the input is constant from a node to the next.
     is_held: bool,
@@ -89,6 +88,22 @@ pub(crate) fn free_motion(mode: &Mode, rate_hz: f64, count: usize) -> [Vec<f64>;
     [run(1.0, 0.0), run(0.0, mode.omega_rad_s)]
 }
 
+/// Contribution of a mode's own motion to displacement and speed of the gage, without that of the present input.
+pub(super) fn at_gage(part: &ModalPart, driven: MotionState) -> MotionState {
+    let ModalPart {
+        mode,
+        residue,
+        quadrature,
+        ..
+    } = *part;
+    let omega = mode.omega_rad_s;
+    MotionState {
+        x: residue * driven.x + quadrature / omega * driven.speed,
+        speed: (residue - 2.0 * mode.damping_ratio * quadrature) * driven.speed
+            - quadrature * omega * driven.x,
+    }
+}
+
 /// Gauss–Legendre nodes and weights on 0 to 1, exact to degree 11.
 const GAUSS: [(f64, f64); 6] = [
     (0.033_765_242_898_423_99, 0.085_662_246_189_585_17),
@@ -129,16 +144,20 @@ impl LinearStep {
     }
 
     /// The step of a mode's contribution to the motion of the gage.
-    pub(super) fn seen(mut self, part: &ModalPart) -> Self {
-        for [x, speed] in &mut self.of_input {
-            let driven = MotionState {
-                x: *x,
-                speed: *speed,
-            };
-            let both = seen(part, driven);
-            (*x, *speed) = (both.x, both.speed);
-        }
+    pub(super) fn at_gage(mut self, part: &ModalPart) -> Self {
+        self.of_input = self.of_input.map(|[x, speed]| {
+            let at_gage = at_gage(part, MotionState { x, speed });
+            [at_gage.x, at_gage.speed]
+        });
         self
+    }
+
+    /// What a constant force adds over a step.
+    pub(super) fn held(&self, force: f64) -> MotionState {
+        MotionState {
+            x: force * (1.0 - self.of_x[0]),
+            speed: -force * self.of_x[1],
+        }
     }
 
     /// The state at the next node; both numbers in the same operations, which a processor does at once.

@@ -5,15 +5,15 @@
 //! y_k'' + 2ζ_k ω_k y_k' + ω_k² y_k = ω_k² G u,   z_k'' + 2ζ_k ω_k z_k' + ω_k² z_k = −ω_k² g_k n(x, x')
 //! ```
 //!
-//! `y_k` is driven by the input and `z_k` by the torques `n` at the gage. Both move alike between the nodes, so that one
-//! state per mode has them both: `v_k = r_k y_k + q_k y_k'/ω_k + z_k` and its rate, in which `q_k ω_k G u` is left out, as
-//! it follows the input without a state. The steps are exact from node to node. A torque
-//! changes the speed of the gage at a node, and that of each `z_k` by its contribution `ω_k² g_k`. Sharp dry friction
+//! `y_k` is driven by the input and `z_k` by the torques `n` at the gage. One state per mode has both:
+//! `v_k = r_k y_k + q_k y_k'/ω_k + z_k` and `v_k' − q_k ω_k G u`. With the free motion `e^{Bt}` of `(y_k, y_k')` it is
+//! `(r_k + q_k B/ω_k) (y_k, y_k') + (z_k, z_k')`, and that factor commutes with `e^{Bt}`, so that the state moves like
+//! both between the nodes; `q_k ω_k G u` needs no state and is added at the nodes. The steps are exact. A torque changes the speed of the gage at a node, and that of each `z_k` by its contribution `ω_k² g_k`. Sharp dry friction
 //! is constant over a step: as much as stops the gage at its end, but no more than its magnitude (J. J. Moreau,
 //! *Numerical aspects of the sweeping process*, Comput. Methods Appl. Mech. Eng. 177 (1999), 329).
 
 use super::input::Excitation;
-use super::integrate::{LinearStep, MotionState};
+use super::integrate::{LinearStep, MotionState, at_gage};
 use super::run::{Acting, MotionProgress, kicked, remembered, shown};
 use super::side_by_side::{OngoingMotion, Stepped};
 use crate::modal::{ModalPart, ModalResponse};
@@ -32,25 +32,9 @@ pub(super) fn begin(stand: &ModalResponse, start: MotionState) -> Vec<MotionStat
             x: start.x / part.residue,
             speed: start.speed / part.residue,
         };
-        modes[place] = seen(part, driven);
+        modes[place] = at_gage(part, driven);
     }
     modes
-}
-
-/// Contribution of a mode's own motion to displacement and speed of the gage, without that of the present input.
-pub(super) fn seen(part: &ModalPart, driven: MotionState) -> MotionState {
-    let ModalPart {
-        mode,
-        residue,
-        quadrature,
-        ..
-    } = *part;
-    let omega = mode.omega_rad_s;
-    MotionState {
-        x: residue * driven.x + quadrature / omega * driven.speed,
-        speed: (residue - 2.0 * mode.damping_ratio * quadrature) * driven.speed
-            - quadrature * omega * driven.x,
-    }
 }
 
 /// A mode with its integration step.
@@ -60,7 +44,7 @@ struct SteppedMode {
     at_gage: f64,
     /// `ω² g`: acceleration by a unit torque at the gage.
     pushed_by: f64,
-    /// `v` and its rate.
+    /// `v`, and `v'` without `q ω G u`.
     motion: MotionState,
 }
 
@@ -87,11 +71,14 @@ impl<'a> Stepped<'a> for ModalIntegrator<'a> {
         window: &[f64],
     ) -> (Self, MotionState) {
         let (gain, step_s) = (motion.gain, input.step_s());
-        let stepped = |(part, at): (&ModalPart, &MotionState)| SteppedMode {
-            step: LinearStep::new(&part.mode, gain, step_s, input.between()).seen(part),
-            at_gage: part.at_gage.unwrap_or(0.0),
-            pushed_by: part.mode.omega_rad_s.powi(2) * part.at_gage.unwrap_or(0.0),
-            motion: *at,
+        let stepped = |(part, at): (&ModalPart, &MotionState)| {
+            let share = part.at_gage.unwrap_or(0.0);
+            SteppedMode {
+                step: LinearStep::new(&part.mode, gain, step_s, input.between()).at_gage(part),
+                at_gage: share,
+                pushed_by: part.mode.omega_rad_s.powi(2) * share,
+                motion: *at,
+            }
         };
         let parts = motion.stand.parts().iter();
         let modes: Vec<SteppedMode> = parts.zip(&motion.progress.modes).map(stepped).collect();
@@ -166,14 +153,11 @@ impl ModalIntegrator<'_> {
         let stops: f64 = self
             .modes
             .iter()
-            .map(|mode| -mode.at_gage * mode.step.of_x[1])
+            .map(|mode| mode.step.held(mode.at_gage).speed)
             .sum();
         let friction = (moved.speed / stops).clamp(-self.dry, self.dry);
         for mode in &mut self.modes {
-            let (x, speed) = (
-                -mode.at_gage * friction * (1.0 - mode.step.of_x[0]),
-                mode.at_gage * friction * mode.step.of_x[1],
-            );
+            let MotionState { x, speed } = mode.step.held(-mode.at_gage * friction);
             mode.motion.x += x;
             mode.motion.speed += speed;
             moved.x += x;

@@ -187,9 +187,10 @@ impl Integrator<'_> {
     fn slide(&mut self, state: MotionState, window: &[f64]) -> MotionState {
         let friction = -self.dry * self.direction;
         let linear = self.step.advance(state, window);
+        let held = self.step.held(friction);
         let moved = MotionState {
-            x: linear.x + friction * (1.0 - self.step.of_x[0]),
-            speed: linear.speed - friction * self.step.of_x[1],
+            x: linear.x + held.x,
+            speed: linear.speed + held.speed,
         };
         let moved = self.kick(moved, moved.speed - state.speed);
         if moved.speed * self.direction > 0.0 {
