@@ -472,9 +472,7 @@ fn a_wrong_phase_is_part_of_the_uncertainty() {
     folder.write("stand.toml", stand(590.0, ", std = \"2 Hz\""));
     folder.write("other.toml", stand(592.0, ""));
     let sine = |i: usize| (std::f64::consts::TAU * 590.0 * i as f64 / 20_000.0).sin();
-    let rows = (0..40_000).map(|i| format!("{},{}\n", i as f64 / 20_000.0, sine(i)));
-    let text = "time_s,torque_n_m\n".to_owned() + &rows.collect::<String>();
-    folder.write("in.csv", text);
+    folder.write("in.csv", sampled("torque_n_m", 20_000.0, 40_000, sine));
     let torque = |name: &str, more: &[&str]| {
         let args = ["compensate", "in.csv", "--stand", name, "--band", "900"];
         let ran = folder.run(&[&args[..], more].concat());

@@ -1,8 +1,8 @@
 //! Fits of other effects from where the best one ended.
 //!
-//! With several modes, a frequency that is 1 % wrong adds up to whole cycles over a record, and the fit of the right effect may
-//! get stuck there, while another changes the spring alike and arrives near the right frequencies. From those, the right
-//! effect needs no more than its own magnitude.
+//! With several modes, a frequency that is 1 % wrong adds up to whole cycles over a record, and the fit of the right
+//! effect may get stuck there, while another changes the spring alike and arrives near the right frequencies. From those,
+//! the right effect needs no more than its own magnitude.
 
 use super::fit::{FittedModel, fit};
 use super::record::{InitialState, StandRecord};
@@ -38,19 +38,16 @@ pub fn fit_from_best(
     if !is_first || fitted.structure.context.several.is_none() {
         return;
     }
-    let sum = |fit: &Option<ScoredModel>| match fit {
-        Some(model) => model.fitted.train_sum,
-        None => fitted.train_sum,
+    let sum = |fit: &Option<ScoredModel>| {
+        let found = fit.as_ref();
+        found.map_or(fitted.train_sum, |model| model.fitted.train_sum)
     };
-    let best = fits.iter().min_by(|a, b| sum(a).total_cmp(&sum(b)));
-    let best = best
-        .and_then(|best| best.as_ref())
-        .map(|best| best.fitted.clone());
-    let is_close = |best: &FittedModel| best.train_sum <= CLOSE * fitted.train_sum;
-    let Some(best) = best.filter(is_close) else {
+    let found = fits.iter().flatten().map(|model| &model.fitted);
+    let best = found.min_by(|a, b| a.train_sum.total_cmp(&b.train_sum));
+    let Some(best) = best.filter(|best| best.train_sum <= CLOSE * fitted.train_sum) else {
         return;
     };
-    let Some(near) = Near::of(&best, records) else {
+    let Some(near) = Near::of(best, records) else {
         return;
     };
     let is_stuck = |k: &usize| {
@@ -125,8 +122,8 @@ impl<'a> Near<'a> {
     fn start(&self, form: EffectForm) -> Option<(f64, Vec<f64>)> {
         let structure = self.structure.with(form);
         let size = form.size();
-        let magnitudes = MAGNITUDES.iter().filter(|m| size.is_some() || **m == 1.0);
-        let own = magnitudes.flat_map(|magnitude| {
+        let tried = if size.is_some() { MAGNITUDES.len() } else { 1 };
+        let own = MAGNITUDES[..tried].iter().flat_map(|magnitude| {
             form.form.starts.iter().map(move |start| {
                 let mut own = start[..form.moved()].to_vec();
                 if let Some(size) = size {

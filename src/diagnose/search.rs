@@ -272,7 +272,8 @@ pub fn reject_all(tried: &mut [CandidateFit], reason: impl Fn(&CandidateFit) -> 
 
 /// The best fit of each form, scored. The forms whose starts have the smallest residuals get a first fit (all of them
 /// if there is no effect yet), those that reduce the training error a second one, and those close to the largest
-/// reduction a full one; beside several modes, stuck ones start again from the best. The amount of work depends on the records alone, not on the clock.
+/// reduction a full one; beside several modes, stuck ones start again from the best. The amount of work depends on the
+/// records alone, not on the clock.
 pub fn fit_all(
     base: &BaseModel,
     forms: &[EffectForm],

@@ -101,8 +101,8 @@ pub struct RecordNoise {
 }
 
 impl RecordNoise {
-    /// Noise of a record with this density, and this rms about its mean; `None` if there is too little room between the band and
-    /// the Nyquist frequency to see the floor, or the density there is zero.
+    /// Noise of a record with this density, and this rms about its mean; `None` if there is too little room between the
+    /// band and the Nyquist frequency to see the floor, or the density there is zero.
     ///
     /// The noise is white, the same inside the band as above it, unless the record shows that it went through a low-pass
     /// (`noise_density`).

@@ -117,30 +117,25 @@ const GAUSS: [(f64, f64); 6] = [
 impl LinearStep {
     pub(super) fn new(mode: &Mode, gain: f64, step_s: f64, between: Between) -> Self {
         let [a, b, c, d] = free(mode, step_s);
-        if between == Between::Held {
-            // For a constant input, the distance to the equilibrium decays like the free motion.
-            return Self {
-                of_x: [a, c],
-                of_speed: [b, d],
-                is_held: true,
-                of_input: [[0.0; 2], [gain * (1.0 - a), -gain * c], [0.0; 2], [0.0; 2]],
-            };
+        let mut step = Self {
+            of_x: [a, c],
+            of_speed: [b, d],
+            is_held: between == Between::Held,
+            of_input: [[0.0; 2]; 4],
+        };
+        if step.is_held {
+            step.of_input[1] = step.held(gain);
+            return step;
         }
-        let mut of_input = [[0.0; 2]; 4];
         for (place, weight) in GAUSS {
             let [_, x, _, speed] = free(mode, (1.0 - place) * step_s);
             let force = weight * step_s * gain * mode.omega_rad_s * mode.omega_rad_s;
-            for ([to_x, to_speed], share) in of_input.iter_mut().zip(cubic(place)) {
+            for ([to_x, to_speed], share) in step.of_input.iter_mut().zip(cubic(place)) {
                 *to_x += force * x * share;
                 *to_speed += force * speed * share;
             }
         }
-        Self {
-            of_x: [a, c],
-            of_speed: [b, d],
-            is_held: false,
-            of_input,
-        }
+        step
     }
 
     /// The step of a mode's contribution to the motion of the gage.
@@ -152,12 +147,11 @@ impl LinearStep {
         self
     }
 
-    /// What a constant force adds over a step.
-    pub(super) fn held(&self, force: f64) -> MotionState {
-        MotionState {
-            x: force * (1.0 - self.of_x[0]),
-            speed: -force * self.of_x[1],
-        }
+    /// What a force that is constant over the step adds to `x` and `x'`: the distance to its equilibrium decays like the
+    /// free motion.
+    pub(super) fn held(&self, force: f64) -> [f64; 2] {
+        let [a, c] = self.of_x;
+        [force * (1.0 - a), -force * c]
     }
 
     /// The state at the next node; both numbers in the same operations, which a processor does at once.

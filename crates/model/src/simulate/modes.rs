@@ -8,9 +8,10 @@
 //! `y_k` is driven by the input and `z_k` by the torques `n` at the gage. One state per mode has both:
 //! `v_k = r_k y_k + q_k y_k'/ω_k + z_k` and `v_k' − q_k ω_k G u`. With the free motion `e^{Bt}` of `(y_k, y_k')` it is
 //! `(r_k + q_k B/ω_k) (y_k, y_k') + (z_k, z_k')`, and that factor commutes with `e^{Bt}`, so that the state moves like
-//! both between the nodes; `q_k ω_k G u` needs no state and is added at the nodes. The steps are exact. A torque changes the speed of the gage at a node, and that of each `z_k` by its contribution `ω_k² g_k`. Sharp dry friction
-//! is constant over a step: as much as stops the gage at its end, but no more than its magnitude (J. J. Moreau,
-//! *Numerical aspects of the sweeping process*, Comput. Methods Appl. Mech. Eng. 177 (1999), 329).
+//! both between the nodes, exactly; `q_k ω_k G u` needs no state and is added at the nodes. A torque changes the speed of
+//! the gage at a node, and that of each `z_k` by its contribution `ω_k² g_k`. Sharp dry friction is constant over a step:
+//! as much as stops the gage at its end, but no more than its magnitude (J. J. Moreau, *Numerical aspects of the sweeping
+//! process*, Comput. Methods Appl. Mech. Eng. 177 (1999), 329).
 
 use super::input::Excitation;
 use super::integrate::{LinearStep, MotionState, at_gage};
@@ -153,11 +154,11 @@ impl ModalIntegrator<'_> {
         let stops: f64 = self
             .modes
             .iter()
-            .map(|mode| mode.step.held(mode.at_gage).speed)
+            .map(|mode| mode.step.held(mode.at_gage)[1])
             .sum();
         let friction = (moved.speed / stops).clamp(-self.dry, self.dry);
         for mode in &mut self.modes {
-            let MotionState { x, speed } = mode.step.held(-mode.at_gage * friction);
+            let [x, speed] = mode.step.held(-mode.at_gage * friction);
             mode.motion.x += x;
             mode.motion.speed += speed;
             moved.x += x;

@@ -187,10 +187,10 @@ impl Integrator<'_> {
     fn slide(&mut self, state: MotionState, window: &[f64]) -> MotionState {
         let friction = -self.dry * self.direction;
         let linear = self.step.advance(state, window);
-        let held = self.step.held(friction);
+        let [x, speed] = self.step.held(friction);
         let moved = MotionState {
-            x: linear.x + held.x,
-            speed: linear.speed + held.speed,
+            x: linear.x + x,
+            speed: linear.speed + speed,
         };
         let moved = self.kick(moved, moved.speed - state.speed);
         if moved.speed * self.direction > 0.0 {
