@@ -71,7 +71,7 @@ const EINTR: &str = "4";
 fn endings(call: &str) -> &'static [&'static str] {
     match call {
         "open" => &[EIO],
-        "create" => &[ENOSPC],
+        "create" | "unnamed" => &[ENOSPC],
         "read" => &[EIO, EINTR, "short"],
         "write" => &[ENOSPC, EINTR, "short", "abort"],
         "sync" => &[EIO, "abort"],

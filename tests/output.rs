@@ -170,6 +170,29 @@ fn a_reader_that_goes_away_is_no_failure() {
     assert!(start.starts_with(b"time_s,compensated_torque_n_m\n0,"));
 }
 
+/// With this fault, incomplete outputs have temporary names, as on systems without unnamed files; with the other, which no
+/// call has, they have none.
+const NAMED: [&str; 2] = ["unnamed * 95", "none * 95"];
+
+/// Waits until a run has opened this many outputs, with or without a name.
+#[cfg(unix)]
+fn wait_for_outputs(folder: &Folder, child: &std::process::Child, count: usize) {
+    let named = || {
+        let names = folder.names();
+        names.iter().filter(|name| name.ends_with(".part")).count()
+    };
+    let unnamed = || {
+        let files = std::fs::read_dir(format!("/proc/{}/fd", child.id()));
+        let links = files.into_iter().flatten().flatten();
+        let links = links.filter_map(|file| std::fs::read_link(file.path()).ok());
+        let deleted = links.filter(|to| to.to_string_lossy().ends_with(" (deleted)"));
+        deleted.filter(|to| to.starts_with(folder.path(""))).count()
+    };
+    while named().max(unnamed()) < count {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_leaves_nothing() {
@@ -178,20 +201,14 @@ fn an_interrupted_run_leaves_nothing() {
         &folder.path(""),
         &["compensate", "-", "--stand", "stand.toml", "-o", "out.csv"],
     )
+    .env("TORQCOMP_FAULT", NAMED[0])
     .stdin(Stdio::piped())
     .spawn()
     .expect("the binary starts");
     let mut pipe = child.stdin.take().expect("a pipe");
     std::io::Write::write_all(&mut pipe, folder.read("in.csv").as_bytes()).expect("rows");
     // It waits for more rows with its temporary file open.
-    let part = || folder.names().iter().any(|name| name.ends_with(".part"));
-    for _ in 0..500 {
-        if part() {
-            break;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(10));
-    }
-    assert!(part(), "{:?}", folder.names());
+    wait_for_outputs(&folder, &child, 1);
     signal("TERM", &child);
     assert_eq!(child.wait().expect("the binary ends").code(), Some(143));
     drop(pipe);
@@ -359,7 +376,8 @@ fn a_link_to_nothing_stays_one() {
 #[cfg(unix)]
 #[test]
 fn two_outputs_appear_both_or_neither() {
-    for old in [None, Some("precious\n")] {
+    let cases = [None, Some("precious\n")].into_iter();
+    for (old, named) in cases.flat_map(|old| NAMED.map(|named| (old, named))) {
         let folder = folder();
         if let Some(old) = old {
             folder.write("out.csv", old);
@@ -377,21 +395,13 @@ fn two_outputs_appear_both_or_neither() {
             "--json",
         ];
         let mut child = command(&folder.path(""), &args)
+            .env("TORQCOMP_FAULT", named)
             .stdin(Stdio::piped())
             .spawn()
             .expect("the binary starts");
         let mut pipe = child.stdin.take().expect("a pipe");
         std::io::Write::write_all(&mut pipe, folder.read("in.csv").as_bytes()).expect("rows");
-        let parts = || {
-            folder
-                .names()
-                .iter()
-                .filter(|name| name.ends_with(".part"))
-                .count()
-        };
-        while parts() < 2 {
-            std::thread::sleep(std::time::Duration::from_millis(10));
-        }
+        wait_for_outputs(&folder, &child, 2);
         std::fs::create_dir(folder.path("out.svg")).unwrap();
         drop(pipe);
         let ran = child.wait_with_output().expect("it ends");
@@ -423,11 +433,82 @@ fn a_full_device_for_one_output_leaves_the_other_unwritten() {
 
 #[cfg(target_os = "linux")]
 #[test]
+fn a_killed_run_leaves_nothing() {
+    let folder = folder();
+    let args = ["compensate", "-", "--stand", "stand.toml", "-o", "out.csv"];
+    let mut child = command(&folder.path(""), &args)
+        .stdin(Stdio::piped())
+        .spawn()
+        .expect("the binary starts");
+    let mut pipe = child.stdin.take().expect("a pipe");
+    std::io::Write::write_all(&mut pipe, folder.read("in.csv").as_bytes()).expect("rows");
+    wait_for_outputs(&folder, &child, 1);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(folder.names(), ["in.csv", "stand.toml"]);
+}
+
+/// A lack of memory that shows only during the run, from too little for its start to enough for all of it.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_run_without_memory_says_so_and_leaves_nothing() {
+    let folder = folder();
+    let mut said = String::new();
+    for limit_kib in (16_000..).step_by(1000) {
+        let script = format!("ulimit -v {limit_kib}; exec \"$0\" \"$@\"");
+        let ran = std::process::Command::new("sh")
+            .args(["-c", &script, env!("CARGO_BIN_EXE_torqcomp")])
+            .args(COMPENSATE)
+            .args(["--whole-record", "-o", "out.csv"])
+            .current_dir(folder.path(""))
+            .output()
+            .expect("the shell starts");
+        if ran.status.success() {
+            break;
+        }
+        said.push_str(&String::from_utf8_lossy(&ran.stderr));
+        assert_eq!(folder.names(), ["in.csv", "stand.toml"], "{limit_kib} kB");
+    }
+    assert!(said.contains("memory allocation of"), "{said}");
+}
+
+/// Rust's runtime opens `/dev/null` in place of a closed standard output.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_closed_standard_output_is_a_failure() {
+    let folder = folder();
+    let run = |rest: &str| {
+        let script = format!("exec \"$0\" compensate in.csv --stand stand.toml {rest}");
+        let ran = std::process::Command::new("sh")
+            .args(["-c", &script, env!("CARGO_BIN_EXE_torqcomp")])
+            .current_dir(folder.path(""))
+            .output()
+            .expect("the shell starts");
+        (
+            ran.status.code(),
+            String::from_utf8_lossy(&ran.stderr).into_owned(),
+        )
+    };
+    let (code, said) = run(">&-");
+    assert_eq!(code, Some(1), "{said}");
+    assert!(
+        said.contains("standard output: cannot be written: it is closed; redirect it"),
+        "{said}"
+    );
+    for quiet in [">/dev/null", "<&- 2>&- >/dev/null", "-o out.csv >&-"] {
+        assert_eq!(run(quiet).0, Some(0), "{quiet}");
+    }
+    assert_eq!(folder.names(), ["in.csv", "out.csv", "stand.toml"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
 fn what_a_killed_run_left_is_removed_by_the_next() {
     let folder = folder();
     let args = ["compensate", "-", "--stand", "stand.toml", "-o", "out.csv"];
     let start = || {
         let mut child = command(&folder.path(""), &args)
+            .env("TORQCOMP_FAULT", NAMED[0])
             .stdin(Stdio::piped())
             .spawn()
             .expect("the binary starts");
@@ -500,15 +581,14 @@ fn signals_leave_nothing_or_are_ignored() {
             let mut child = std::process::Command::new("sh")
                 .args(["-c", &script, env!("CARGO_BIN_EXE_torqcomp")])
                 .current_dir(folder.path(""))
+                .env("TORQCOMP_FAULT", NAMED[usize::from(ignored)])
                 .stdin(Stdio::piped())
                 .stderr(Stdio::null())
                 .spawn()
                 .expect("the shell starts");
             let mut pipe = child.stdin.take().expect("a pipe");
             std::io::Write::write_all(&mut pipe, folder.read("in.csv").as_bytes()).expect("rows");
-            while !folder.names().iter().any(|name| name.ends_with(".part")) {
-                std::thread::sleep(std::time::Duration::from_millis(10));
-            }
+            wait_for_outputs(&folder, &child, 1);
             crate::util::signal(signal, &child);
             if !ignored {
                 let code = child.wait().expect("it ends").code();

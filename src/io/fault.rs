@@ -1,7 +1,7 @@
 //! Fault injection: tests make any one system call fail and examine the result. Optimised builds have none of this.
 //!
-//! `TORQCOMP_FAULT="write 2 28"` makes the third write fail with the error number 28. Instead of the number, `short`
-//! moves one byte only, and `abort` ends the process immediately. `TORQCOMP_FAULT_LOG` names a file that lists the
+//! `TORQCOMP_FAULT="write 2 28"` makes the third write fail with the error number 28, `"write * 28"` every one. Instead of
+//! the error number, `short` moves one byte only, and `abort` ends the process immediately. `TORQCOMP_FAULT_LOG` names a file that lists the
 //! calls of a run.
 
 use std::io;
@@ -11,6 +11,8 @@ use std::io;
 pub enum Call {
     Open,
     Create,
+    /// Of a file without a name, which not every system has.
+    Unnamed,
     Read,
     Write,
     Sync,
@@ -50,7 +52,11 @@ pub fn limit(call: Call, bytes: usize) -> io::Result<usize> {
         return Ok(bytes);
     };
     let count = COUNTS[call as usize].fetch_add(1, Ordering::Relaxed);
-    match fault.strip_prefix(&format!("{name} {count} ")) {
+    let ending = fault.strip_prefix(&name).and_then(|fault| {
+        let this = fault.strip_prefix(&format!(" {count} "));
+        this.or_else(|| fault.strip_prefix(" * "))
+    });
+    match ending {
         None => Ok(bytes),
         Some("short") => Ok(bytes.min(1)),
         Some("abort") => std::process::abort(),

@@ -11,6 +11,7 @@ pub mod output;
 pub(crate) mod packed;
 mod parts;
 mod reading;
+mod standard_output;
 pub(crate) mod storage;
 pub(crate) mod sum;
 pub mod text;

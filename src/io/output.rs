@@ -6,9 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use tempfile::NamedTempFile;
-
-use super::{parts, storage, sum};
+use super::parts::{self, Part};
+use super::{standard_output, storage, sum};
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::{ShowPath, is_dash};
 
@@ -42,7 +41,7 @@ enum Kind {
     /// An existing pipe or device, without renaming.
     Device(File),
     File {
-        part: NamedTempFile,
+        part: Part,
         path: PathBuf,
         policy: Policy,
     },
@@ -111,10 +110,10 @@ impl Output {
             found => {
                 let path = end_of_links(path);
                 let part =
-                    parts::create_in(folder_of(&path)).map_err(|e| folder_failure(&path, &e))?;
+                    Part::create_in(folder_of(&path)).map_err(|e| folder_failure(&path, &e))?;
                 if let Ok(meta) = found {
                     // The permissions of a replaced file are preserved.
-                    let kept = part.as_file().set_permissions(meta.permissions());
+                    let kept = part.file().set_permissions(meta.permissions());
                     kept.map_err(|e| Failure::writing(&name, &e))?;
                 }
                 Kind::File { part, path, policy }
@@ -149,7 +148,7 @@ impl Output {
         match &mut self.kind {
             Kind::Stdout(out) => out.flush(),
             Kind::Device(file) => file.flush(),
-            Kind::File { part, policy, .. } if policy.sync => storage::sync(part.as_file()),
+            Kind::File { part, policy, .. } if policy.sync => storage::sync(part.file()),
             Kind::File { .. } => Ok(()),
         }
     }
@@ -157,7 +156,7 @@ impl Output {
     /// SHA-256 of the bytes written; `None` if it is not a file.
     pub(crate) fn sum(&self) -> io::Result<Option<String>> {
         match &self.kind {
-            Kind::File { part, .. } => sum::of_file(part.path()).map(Some),
+            Kind::File { part, .. } => sum::of_open(part.file()).map(Some),
             Kind::Stdout(_) | Kind::Device(_) => Ok(None),
         }
     }
@@ -178,11 +177,12 @@ impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match &mut self.kind {
             Kind::Stdout(out) => {
+                standard_output::is_there()?;
                 IS_STDOUT_USED.store(true, Ordering::Relaxed);
                 storage::write(out, bytes)
             }
             Kind::Device(file) => storage::write(file, bytes),
-            Kind::File { part, .. } => storage::write(part.as_file_mut(), bytes),
+            Kind::File { part, .. } => storage::write(&mut part.file(), bytes),
         }
     }
 
@@ -190,7 +190,7 @@ impl Write for Output {
         match &mut self.kind {
             Kind::Stdout(out) => out.flush(),
             Kind::Device(file) => file.flush(),
-            Kind::File { part, .. } => part.as_file_mut().flush(),
+            Kind::File { part, .. } => part.file().flush(),
         }
     }
 }
@@ -245,13 +245,14 @@ struct Renamed {
 }
 
 impl Renamed {
-    fn new(part: NamedTempFile, path: PathBuf, policy: Policy, keep: bool) -> io::Result<Self> {
+    fn new(part: Part, path: PathBuf, policy: Policy, keep: bool) -> io::Result<Self> {
         let is_new = std::fs::symlink_metadata(&path).is_err();
         let replaced = match keep && !is_new {
-            true => second_name(&path),
+            // `None` if the file system has no links.
+            true => parts::second_name(&path, folder_of(&path)).ok(),
             false => None,
         };
-        storage::rename(part.into_temp_path(), &path, policy.replace)?;
+        storage::rename(part.named()?, &path, policy.replace)?;
         Ok(Self {
             path,
             is_new,
@@ -288,13 +289,6 @@ impl Renamed {
             .at(self.path.shown())
         })
     }
-}
-
-/// A second name for an existing file, removed on drop; `None` if the file system does not support links.
-fn second_name(path: &Path) -> Option<tempfile::TempPath> {
-    let part = parts::create_in(folder_of(path)).ok()?.into_temp_path();
-    storage::link(path, &part).ok()?;
-    Some(part)
 }
 
 fn folder_failure(path: &Path, error: &io::Error) -> Failure {

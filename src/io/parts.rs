@@ -1,12 +1,13 @@
 //! Temporary files of incomplete outputs, and their removal when a run ends early.
 
 use std::collections::BTreeSet;
+use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use tempfile::NamedTempFile;
+use tempfile::TempPath;
 
 use super::storage;
 
@@ -81,13 +82,71 @@ fn is_ignored(signal: i32) -> bool {
     mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
-/// A file in a folder that is renamed when it is complete, and removed otherwise. Its temporary name identifies the
-/// process and time of its creation.
-pub fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
-    let owner = Owner::of_this_process();
-    if is_first_in(folder) {
-        remove_orphans(folder, &owner);
+/// A file in a folder that gets its name when it is complete. Until then it has none, so that nothing is left of it however
+/// the process ends; where the system has no such files, a temporary one, and it is removed unless it is completed.
+pub struct Part {
+    file: File,
+    name: Option<TempPath>,
+    folder: PathBuf,
+}
+
+impl Part {
+    /// Creates it.
+    pub fn create_in(folder: &Path) -> io::Result<Self> {
+        if is_first_in(folder) {
+            remove_orphans(folder, &Owner::of_this_process());
+        }
+        let (file, name) = match storage::create_unnamed(folder) {
+            Some(file) => (file, None),
+            None => {
+                let named = with_name(|builder| storage::create(builder, folder))?;
+                let (file, name) = named.into_parts();
+                (file, Some(name))
+            }
+        };
+        Ok(Self {
+            file,
+            name,
+            folder: folder.to_owned(),
+        })
     }
+
+    /// The open file.
+    pub fn file(&self) -> &File {
+        &self.file
+    }
+
+    /// Its temporary name, given now if it has none.
+    pub fn named(self) -> io::Result<TempPath> {
+        let Self { file, name, folder } = self;
+        match name {
+            Some(name) => Ok(name),
+            None => with_name(|builder| storage::name(&file, builder, &folder))
+                .or_else(|_| copied(&file, &folder)),
+        }
+    }
+}
+
+/// A synced copy with a temporary name, for a file system that cannot name an unnamed file.
+fn copied(file: &File, folder: &Path) -> io::Result<TempPath> {
+    let copy = with_name(|builder| storage::create(builder, folder))?;
+    copy.as_file()
+        .set_permissions(file.metadata()?.permissions())?;
+    io::copy(&mut storage::from_start(file)?, &mut copy.as_file())?;
+    storage::sync(copy.as_file())?;
+    Ok(copy.into_temp_path())
+}
+
+/// A second name for an existing file, removed on drop.
+pub fn second_name(path: &Path, folder: &Path) -> io::Result<TempPath> {
+    with_name(|builder| storage::link(path, builder, folder))
+}
+
+/// Creates a file, or a name for one, that identifies the process and the time of its creation.
+fn with_name<N: AsRef<Path>>(
+    create: impl FnOnce(&tempfile::Builder<'_, '_>) -> io::Result<N>,
+) -> io::Result<N> {
+    let owner = Owner::of_this_process();
     let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH);
     let seconds = since_epoch.map_or(0, |since| since.as_secs());
     let prefix = format!("{PREFIX}{}-{}-{seconds}-", owner.place, owner.process);
@@ -96,12 +155,12 @@ pub fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
     set_permissions(&mut builder);
     // Held during creation, so that an interruption sees all files or prevents them.
     let mut open = open();
-    let part = storage::create(&builder, folder)?;
+    let named = create(&builder)?;
     if open.len() >= MOST_OPEN {
         open.retain(|path| path.exists());
     }
-    open.push(part.path().to_owned());
-    Ok(part)
+    open.push(named.as_ref().to_owned());
+    Ok(named)
 }
 
 /// Gives the finished file the permissions of any other new file.

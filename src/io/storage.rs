@@ -83,13 +83,20 @@ pub(crate) fn open_at_end(path: &Path) -> io::Result<File> {
 }
 
 /// The first bytes of a file, at most `most`; empty for a pipe or device.
-pub(crate) fn first_bytes(mut file: &File, most: usize) -> io::Result<Vec<u8>> {
+pub(crate) fn first_bytes(file: &File, most: usize) -> io::Result<Vec<u8>> {
     let mut first = Vec::new();
     if has_bytes(file)? {
-        file.seek(SeekFrom::Start(0))?;
-        Stored(file).take(most as u64).read_to_end(&mut first)?;
+        from_start(file)?
+            .take(most as u64)
+            .read_to_end(&mut first)?;
     }
     Ok(first)
+}
+
+/// Reads an open file from its start.
+pub(super) fn from_start(mut file: &File) -> io::Result<Stored<&File>> {
+    file.seek(SeekFrom::Start(0))?;
+    Ok(Stored(file))
 }
 
 /// Whether the last line of a file has no line end; false for an empty file, a pipe or a device.
@@ -121,13 +128,57 @@ pub(crate) fn write_all(mut file: &File, mut bytes: &[u8]) -> io::Result<()> {
     Ok(())
 }
 
-/// Creates a temporary file.
+/// Creates a file with a temporary name.
 pub(super) fn create(
     builder: &tempfile::Builder<'_, '_>,
     folder: &Path,
 ) -> io::Result<NamedTempFile> {
     check(Call::Create)?;
     builder.tempfile_in(folder)
+}
+
+/// Creates a file without a name, which disappears with the process; `None` where the system has none, or no way to name
+/// it later.
+#[cfg(target_os = "linux")]
+pub(super) fn create_unnamed(folder: &Path) -> Option<File> {
+    use rustix::fs::{Mode, OFlags};
+    check(Call::Unnamed).ok()?;
+    let options = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
+    let file = rustix::fs::open(folder, options, Mode::from_raw_mode(0o666)).ok()?;
+    Some(File::from(file)).filter(|file| opened(file).exists())
+}
+
+#[cfg(not(target_os = "linux"))]
+pub(super) fn create_unnamed(_: &Path) -> Option<File> {
+    None
+}
+
+/// The link to an open file of this process.
+#[cfg(target_os = "linux")]
+fn opened(file: &File) -> std::path::PathBuf {
+    use std::os::fd::AsRawFd;
+    format!("/proc/self/fd/{}", file.as_raw_fd()).into()
+}
+
+/// Gives an unnamed file a temporary name.
+#[cfg(target_os = "linux")]
+pub(super) fn name(
+    file: &File,
+    builder: &tempfile::Builder<'_, '_>,
+    folder: &Path,
+) -> io::Result<TempPath> {
+    use rustix::fs::{AtFlags, CWD, linkat};
+    check(Call::Link)?;
+    let opened = opened(file);
+    let named = builder.make_in(folder, |path| {
+        Ok(linkat(CWD, &opened, CWD, path, AtFlags::SYMLINK_FOLLOW)?)
+    });
+    named.map(NamedTempFile::into_temp_path)
+}
+
+#[cfg(not(target_os = "linux"))]
+pub(super) fn name(_: &File, _: &tempfile::Builder<'_, '_>, _: &Path) -> io::Result<TempPath> {
+    Err(io::ErrorKind::Unsupported.into())
 }
 
 /// Writes as many of the bytes as one call accepts.
@@ -181,11 +232,15 @@ pub(super) fn rename(part: TempPath, path: &Path, replace: bool) -> io::Result<(
     renamed.map_err(|error| error.error)
 }
 
-/// Links an existing file under the name of a temporary file.
-pub(super) fn link(path: &Path, part: &TempPath) -> io::Result<()> {
+/// Gives an existing file a second, temporary name.
+pub(super) fn link(
+    path: &Path,
+    builder: &tempfile::Builder<'_, '_>,
+    folder: &Path,
+) -> io::Result<TempPath> {
     check(Call::Link)?;
-    std::fs::remove_file(part)?;
-    std::fs::hard_link(path, part)
+    let named = builder.make_in(folder, |second| std::fs::hard_link(path, second));
+    named.map(NamedTempFile::into_temp_path)
 }
 
 /// An anonymous file in the folder for temporary files, removed with the process.

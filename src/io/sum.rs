@@ -1,18 +1,27 @@
 //! SHA-256 of files and texts.
 
+use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-use super::storage::Stored;
+use super::storage::{Stored, from_start};
 
 /// Number of bytes read at a time.
 const PIECE: usize = 1 << 16;
 
 /// SHA-256 of a file, as 64 hexadecimal digits.
 pub(crate) fn of_file(path: &Path) -> io::Result<String> {
-    let mut file = Stored::open(path)?;
+    of_rest(Stored::open(path)?)
+}
+
+/// SHA-256 of an open file from its start.
+pub(super) fn of_open(file: &File) -> io::Result<String> {
+    of_rest(from_start(file)?)
+}
+
+fn of_rest(mut file: impl Read) -> io::Result<String> {
     let mut piece = vec![0; PIECE];
     let mut sum = Sha256::new();
     loop {
