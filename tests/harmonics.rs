@@ -156,6 +156,8 @@ fn a_speed_that_sways_or_is_off_is_said() {
         ["fundamental-off"]
     );
     assert_eq!(codes(swaying(50.0, 0.0, 0.2), "50"), ["order-or-mains"]);
+    // A line at 50 Hz that is three times as strong as the order beside it says nothing about the speed.
+    assert!(codes(swaying(24.8, 0.0, 1.5), "24.8").is_empty());
 }
 
 /// Strong lines at whole multiples of 1 Hz in a record of 1 s leak nothing into each other's neighbours, but much into
@@ -198,4 +200,42 @@ fn lines_that_are_no_orders_are_in_the_uncertainty() {
             );
         }
     }
+}
+
+/// An oscilloscope of 8 bits and no noise, and a speed that divides its sampling rate: the rounding repeats with each
+/// turn, so that nothing of it is between the orders.
+#[test]
+fn repeated_rounding_is_in_the_uncertainty() {
+    let folder = Folder::new();
+    let (mut squares, mut count) = (0.0, 0);
+    for case in 0..6 {
+        let size = 0.9 + 0.013 * f64::from(case);
+        let row = |i: i32| {
+            let t = f64::from(i) / 10_000.0;
+            let torque = size * (TAU * 50.0 * t + 0.7 * f64::from(case)).cos();
+            format!("{t:.4},{:.2}\n", 0.02 * (torque / 0.02).round())
+        };
+        let rows: String = (0..20_000).map(row).collect();
+        folder.write("in.csv", format!("time_s,compensated_torque_n_m\n{rows}"));
+        let words = [
+            "harmonics",
+            "in.csv",
+            "--fundamental",
+            "50",
+            "--orders",
+            "1-9",
+            "--json",
+        ];
+        let report = folder.json(&words);
+        for (k, component) in report["components"].as_array().unwrap().iter().enumerate() {
+            let [torque, std] = ["torque", "std"].map(|key| component[key].as_f64().unwrap());
+            let truth = if k == 0 { size } else { 0.0 };
+            squares += ((torque - truth) / std).powi(2);
+            count += 1;
+        }
+        let lost = report["warnings"].to_string();
+        assert!(lost.contains("components-lost-in-noise"), "{lost}");
+    }
+    let off = (squares / f64::from(count)).sqrt();
+    assert!((0.2..2.0).contains(&off), "{off} standard uncertainties");
 }

@@ -2,6 +2,7 @@
 
 mod filtered;
 mod mains;
+mod rounding;
 mod speed;
 mod text;
 
@@ -257,7 +258,14 @@ fn fit(
         false => Fundamental::given(args.fundamental),
     };
     let (reference, start_s) = phase_reference(record.start, duration_s);
-    let found = harmonics::fit(samples, record.rate_hz, start_s, fundamental, &orders)?;
+    let mut found = harmonics::fit(samples, record.rate_hz, start_s, fundamental, &orders)?;
+    let seen = samples.part(0..samples.count().min(excerpt::OF_PASSES))?;
+    rounding::add_rounding(
+        &mut found.components,
+        &seen,
+        samples.count(),
+        record.rate_hz,
+    );
 
     let chain = &way.chain;
     let printed = 1.0 / chain.applied.factor;
@@ -272,7 +280,7 @@ fn fit(
     warnings.extend(of_orders(way, record, &fundamental, &orders));
     warnings.extend(lost_warning(&components));
     warnings.extend(mains::warning(&components, duration_s));
-    warnings.extend(of_quality(record, channel, chain)?);
+    warnings.extend(of_quality(record, &seen, channel, chain)?);
     Ok(HarmonicsReport {
         input: source.to_owned(),
         channel: channel.to_owned(),
@@ -325,11 +333,11 @@ fn of_orders(
 /// Warnings from the samples themselves.
 fn of_quality(
     record: &UniformRecord<Spool>,
+    seen: &[f64],
     channel: &str,
     chain: &Calibration,
 ) -> Result<Vec<Warning>, Failure> {
     let count = record.samples.count();
-    let seen = record.samples.part(0..count.min(excerpt::OF_PASSES))?;
     let mut faults = StreamedFaults::default();
     record
         .samples
@@ -343,8 +351,8 @@ fn of_quality(
         samples: count,
         faults: faults.finish(),
     };
-    let levels = chain.levels().warnings(&seen, of.scale, of.unit);
-    let mut found = excerpt::warnings(&seen, of);
+    let levels = chain.levels().warnings(seen, of.scale, of.unit);
+    let mut found = excerpt::warnings(seen, of);
     found.extend(levels);
     Ok(found)
 }

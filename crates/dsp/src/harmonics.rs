@@ -50,6 +50,18 @@ pub struct Component {
     pub std_phase_rad: Option<f64>,
 }
 
+impl Component {
+    /// Adds an independent standard uncertainty of the amplitude.
+    pub fn add_std(&mut self, std: f64) {
+        self.std_amplitude = self.std_amplitude.hypot(std);
+        let amplitude = self.phasor.norm();
+        self.std_phase_rad = self
+            .std_phase_rad
+            .filter(|_| amplitude > self.std_amplitude)
+            .map(|phase| phase.hypot(std / amplitude));
+    }
+}
+
 /// Components of a record and the residual of the fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Harmonics {

@@ -53,7 +53,7 @@ pub(super) fn off(
     let within = |span: f64| {
         let found = refine_fundamental(&samples[..], rate_hz, fundamental_hz, span, orders).ok()?;
         let better = of(Fundamental::given(found.frequency_hz))?;
-        let is_there = better.components.iter().any(is_sure);
+        let is_there = better.components.iter().any(is_sure) && !is_attracted(&given, &better);
         let rest = better.residual_rms.powi(2);
         let lost = given.residual_rms.powi(2) - rest;
         let shift_hz = (found.frequency_hz - fundamental_hz).abs();
@@ -113,16 +113,27 @@ pub(super) fn warning(
         let pairs = samples.iter().zip(&samples[lag..]);
         let changes: Vec<f64> = pairs.map(|(before, after)| after - before).collect();
         // The range ends where the highest order exceeds the spectrum.
-        let fundamental_hz = fundamental_hz.min(0.5 * record.rate_hz / highest / (1.0 + span));
-        refine_fundamental(&changes, record.rate_hz, fundamental_hz, span, orders).ok()
+        let from_hz = fundamental_hz.min(0.5 * record.rate_hz / highest / (1.0 + span));
+        let found = refine_fundamental(&changes, record.rate_hz, from_hz, span, orders).ok()?;
+        let at = |hz: f64| {
+            let fundamental = Fundamental::given(hz);
+            fit(&changes[..], record.rate_hz, 0.0, fundamental, orders).ok()
+        };
+        let both = at(fundamental_hz).zip(at(found.frequency_hz));
+        let is_attracted = both.is_some_and(|(given, found)| is_attracted(&given, &found));
+        Some((found, is_attracted))
     };
-    let with = |span, length| -> Option<Vec<Fundamental>> {
+    let with = |span, length| -> Option<Vec<(Fundamental, bool)>> {
         let parts = 0..PARTS;
         parts.map(|place| part(place, span, length)).collect()
     };
     // A speed that is not found may change so fast that a line exists over a few periods only.
     let few = (FEWEST * record.rate_hz / fundamental_hz) as usize;
     let found = with(SPAN, length).or_else(|| with(WIDE_SPAN, few))?;
+    if found.iter().any(|(_, is_attracted)| *is_attracted) {
+        return None;
+    }
+    let found: Vec<Fundamental> = found.into_iter().map(|(found, _)| found).collect();
     let by_speed = |a: &&Fundamental, b: &&Fundamental| a.frequency_hz.total_cmp(&b.frequency_hz);
     let (slowest, fastest) = (
         found.iter().min_by(by_speed)?,
@@ -173,23 +184,40 @@ pub(super) fn sways(
     let fundamental = Fundamental::given(fundamental_hz);
     let whole = fit(&samples[..], rate_hz, 0.0, fundamental, orders).ok()?;
     let length = count / windows;
-    let angles = (0..windows).map(|window| {
+    // By each order in each window: the angle and its variance.
+    let shown = (0..windows).map(|window| {
         let start = window * length;
         let part = &samples[start..start + length];
         let here = fit(part, rate_hz, start as f64 / rate_hz, fundamental, orders).ok()?;
         let pairs = whole.components.iter().zip(&here.components);
-        let (mut sum, mut weights) = (0.0, 0.0);
-        for (mean, here) in pairs.filter(|(_, here)| is_sure(here)) {
+        let by_order = pairs.map(|(mean, here)| {
             let turned = (here.phasor * mean.phasor.conj()).arg();
-            let weight = (here.phasor.norm() / here.std_amplitude).powi(2);
-            sum += weight * here.order * turned;
-            weights += weight * here.order.powi(2);
-        }
-        (weights > 0.0).then(|| [sum / weights, 1.0 / weights])
+            let std_rad = here.std_amplitude / here.phasor.norm();
+            is_sure(here).then(|| [turned / here.order, (std_rad / here.order).powi(2)])
+        });
+        Some(by_order.collect())
     });
-    let angles: Vec<[f64; 2]> = angles.collect::<Option<_>>()?;
-    let variance = without_line(&angles);
-    let noise = angles.iter().map(|[_, variance]| variance).sum::<f64>() / windows as f64;
+    let shown: Vec<Vec<Option<[f64; 2]>>> = shown.collect::<Option<_>>()?;
+    let mean_angle = |angles: &Vec<Option<[f64; 2]>>| {
+        let sure = angles.iter().flatten();
+        let sums = sure.fold([0.0; 2], |[sum, weights], [angle, variance]| {
+            [sum + angle / variance, weights + 1.0 / variance]
+        });
+        (sums[1] > 0.0).then(|| [sums[0] / sums[1], 1.0 / sums[1]])
+    };
+    let angles: Vec<[f64; 2]> = shown.iter().map(mean_angle).collect::<Option<_>>()?;
+    let (variance, noise) = (without_line(&angles), mean_variance(&angles));
+    // A line beside one order moves only the angle by that one.
+    let contradicts = |k: usize| {
+        let own: Option<Vec<[f64; 2]>> = shown.iter().map(|angles| angles[k]).collect();
+        own.is_some_and(|own| {
+            let noise = SWAYS * mean_variance(&own);
+            without_line(&own) < noise && noise < variance
+        })
+    };
+    if (0..orders.len()).any(contradicts) {
+        return None;
+    }
     let sways_rad = (variance - noise).max(0.0).sqrt();
     let there = whole.components.iter().filter(|c| is_sure(c));
     let highest = there.map(|c| c.order).fold(0.0, f64::max);
@@ -208,9 +236,21 @@ pub(super) fn sways(
     })
 }
 
+/// Whether an order that is significant at the given speed is not at the one found: a strong line that is no order has
+/// attracted another.
+fn is_attracted(given: &Harmonics, found: &Harmonics) -> bool {
+    let mut both = given.components.iter().zip(&found.components);
+    both.any(|(given, found)| is_sure(given) && !is_sure(found))
+}
+
 /// Whether a component is significant.
 fn is_sure(component: &Component) -> bool {
     component.phasor.norm() > THERE * component.std_amplitude
+}
+
+/// Mean of the variances of values.
+fn mean_variance(values: &[[f64; 2]]) -> f64 {
+    values.iter().map(|[_, variance]| variance).sum::<f64>() / values.len() as f64
 }
 
 /// Variance of values about a straight line.
