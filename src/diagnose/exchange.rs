@@ -21,6 +21,7 @@ const MOST_OPEN: usize = 3;
 const FINEST_OPEN: usize = 2;
 /// Forms fitted in place of an effect.
 const FOR_EXCHANGE: SearchEffort = SearchEffort {
+    starts: 1,
     first: 12,
     second: 0.1,
     full: 2,

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use torqcomp_fourier::phasors;
 use torqcomp_model::fit::{self, Differences, Fit, FitError, Options, Parameter};
 use torqcomp_model::{Chain, Mode};
 
@@ -372,10 +373,9 @@ impl FittedModel {
                 continue;
             }
             let excess = 1.0 - amplitude / own;
-            let turn = TAU * frequency_hz / rate_hz;
-            for (sample, i) in found.samples.iter_mut().zip(found.record.range.clone()) {
-                let (sine, cosine) = (turn * i as f64).sin_cos();
-                *sample += excess * (c * cosine + s * sine);
+            let turning = phasors(TAU * frequency_hz / rate_hz, found.record.range.start);
+            for (sample, z) in found.samples.iter_mut().zip(turning) {
+                *sample += excess * (c * z.re + s * z.im);
             }
         }
     }

@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 use std::sync::Arc;
 
+use torqcomp_fourier::phasors;
 use torqcomp_model::simulate::{Excitation, MotionState};
 use torqcomp_model::{Chain, Mode, StandRun};
 
@@ -277,11 +278,10 @@ impl StandRecord {
         }
         nuisance.lines = columns.count();
         for frequency_hz in &terms.lines_hz {
-            let turn = TAU * frequency_hz / rate_hz;
-            let wave =
-                |part: fn(f64) -> f64| self.range.clone().map(|i| part(turn * i as f64)).collect();
-            columns.push(wave(f64::cos));
-            columns.push(wave(f64::sin));
+            let turning = phasors(TAU * frequency_hz / rate_hz, self.range.start);
+            let (cosine, sine) = turning.take(count).map(|z| (z.re, z.im)).unzip();
+            columns.push(cosine);
+            columns.push(sine);
         }
         nuisance
     }

@@ -94,6 +94,8 @@ const WORTHWHILE: f64 = 5.0;
 
 pub const FIRST_FIT: FitEffort = FitEffort::brief(3);
 const SECOND_FIT: FitEffort = FitEffort::brief(5);
+/// Minimum gain of a first fit for a second one, relative to the largest of the same form.
+const COMPARABLE: f64 = 0.5;
 const FULL_FIT: FitEffort = FitEffort::full(15);
 /// Maximum number of successive full fits, and ratio of successive sums of squares above which they end.
 const MOST_FULL_FITS: usize = 4;
@@ -101,8 +103,10 @@ const FALLING: f64 = 0.9;
 /// Initial fractions of the records for the first fits of a stand with several modes.
 const BEGINNINGS: [f64; 3] = [0.03, 0.1, 0.3];
 
-/// Number of forms that advance between the stages of fitting.
+/// Number of forms and starts that advance between the stages of fitting.
 pub struct SearchEffort {
+    /// Number of starts of each form that get a first fit, ranked by their residual.
+    pub starts: usize,
     /// Number of forms that get a first fit, ranked by the residual of their starts.
     pub first: usize,
     /// Minimum gain of the first fit, relative to the largest, for a second one.
@@ -113,7 +117,9 @@ pub struct SearchEffort {
     pub promising: f64,
 }
 
+/// The second start of a first effect rarely leads farther than the first, and hardly ever beside other effects.
 pub const FOR_FIRST_EFFECT: SearchEffort = SearchEffort {
+    starts: 2,
     first: usize::MAX,
     second: 0.03,
     full: 12,
@@ -122,6 +128,7 @@ pub const FOR_FIRST_EFFECT: SearchEffort = SearchEffort {
 /// With an accepted effect, the gain of a first fit predicts that of the last one less well: all parameters must move
 /// together.
 const FOR_SECOND_EFFECT: SearchEffort = SearchEffort {
+    starts: 1,
     first: usize::MAX,
     second: 0.02,
     full: usize::MAX,
@@ -287,8 +294,10 @@ pub fn fit_all(
     let gain = |fit: &FittedModel| fitted.train_sum - fit.train_sum;
     let largest = first.iter().flatten().map(gain).fold(0.0, f64::max);
     let second = parallel(forms.len(), workers.threads, |k| {
+        let own = first[k].iter().map(gain).fold(0.0, f64::max);
         let fits = first[k].iter().map(|fit| {
-            let is_followed = !fit.converged && gain(fit) >= limits.second * largest;
+            let least = (limits.second * largest).max(COMPARABLE * own);
+            let is_followed = !fit.converged && gain(fit) >= least;
             let second = is_followed.then(|| fit.refit(&records.train, SECOND_FIT));
             second.and_then(Result::ok).unwrap_or_else(|| fit.clone())
         });
@@ -361,7 +370,13 @@ fn first_fits(
         if !structure.context.allows(&forms[k]) {
             return Vec::new();
         }
-        best_starts(base, &structure.with(forms[k]), lines, &training)
+        best_starts(
+            base,
+            &structure.with(forms[k]),
+            lines,
+            &training,
+            limits.starts,
+        )
     });
     let left = |k: usize| {
         let left = starts[k].iter().map(|start: &Start| start.left);

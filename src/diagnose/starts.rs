@@ -14,8 +14,6 @@ use super::structure::{EffectForm, Structure};
 use super::unexplained::raw_residual;
 use torqcomp_dsp::{dot, sort_by_number};
 
-/// Number of starts that are fitted.
-const FITTED: usize = 2;
 /// Number of starts whose magnitude is adjusted.
 const SIZED: usize = 4;
 /// Limits of the factor on the magnitude of a start.
@@ -49,13 +47,14 @@ impl Start {
     }
 }
 
-/// The starts with the smallest residuals: each as given and with the magnitude suggested by the
+/// The starts with the smallest residuals, at most `most`: each as given and with the magnitude suggested by the
 /// residual.
 pub fn best_starts(
     base: &BaseModel,
     structure: &Structure,
     lines: &[SpectralLine],
     training: &[StandRecord],
+    most: usize,
 ) -> Vec<Start> {
     let Some(effect) = structure.effects.last() else {
         return Vec::new();
@@ -89,7 +88,7 @@ pub fn best_starts(
         }));
     }
     sort_by_number(&mut found, |start| start.left);
-    found.truncate(FITTED);
+    found.truncate(most);
     found.extend(from_backbone(structure, plain, training));
     found
 }

@@ -4,6 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
+use torqcomp_fourier::phasors;
 
 /// Distances from a line, in bins of the record's spectrum, at which the neighbouring signal is estimated:
 /// beyond the main lobe of the window, and over more than the spacing of a typical comb.
@@ -11,8 +12,6 @@ const BESIDE: std::ops::RangeInclusive<u32> = 3..=20;
 /// Largest plausible variance of the signal at a line, over the squared difference of the record's amplitude
 /// from that of the stand.
 const AGREEMENT: f64 = 8.0;
-/// Samples between resets of a rotating phasor, which limit its rounding error.
-const TURNS: usize = 4096;
 
 /// A steady line, independent of the input; its phase differs from record to record.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,19 +117,12 @@ fn phasor(samples: &[f64], cycles: f64) -> Complex64 {
     let mean = samples.iter().sum::<f64>() / count;
     let mut sum = Complex64::ZERO;
     let mut weights = 0.0;
-    let turn = Complex64::from_polar(1.0, -TAU * cycles);
-    let hann = Complex64::from_polar(1.0, TAU / count);
-    let (mut phase, mut window) = (Complex64::ONE, Complex64::ONE);
-    for (i, sample) in samples.iter().enumerate() {
-        if i % TURNS == 0 {
-            phase = Complex64::from_polar(1.0, -TAU * cycles * i as f64);
-            window = Complex64::from_polar(1.0, TAU * (i as f64 + 0.5) / count);
-        }
-        let weight = 0.5 - 0.5 * window.re;
+    let half = Complex64::from_polar(1.0, 0.5 * TAU / count);
+    let turning = phasors(-TAU * cycles, 0).zip(phasors(TAU / count, 0));
+    for (sample, (phase, window)) in samples.iter().zip(turning) {
+        let weight = 0.5 - 0.5 * (half * window).re;
         weights += weight;
         sum += weight * (sample - mean) * phase;
-        phase *= turn;
-        window *= hann;
     }
     2.0 * sum / weights
 }
