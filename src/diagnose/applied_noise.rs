@@ -11,19 +11,25 @@ use torqcomp_model::simulate::Excitation;
 
 use super::blocks::SplitMix64;
 use super::noise_floor::noise_of_input;
-use super::record::StandRecord;
+use super::record::{InitialState, StandRecord};
 use super::records::Records;
 use super::score::ScoredModel;
+use super::unexplained::raw_residual;
 use torqcomp_dsp::dot;
 
 /// Fraction of a gain above which it is attributed to noise.
 const MOSTLY: f64 = 0.5;
+/// A gain of so many times the power of the plain stand's response to the noise is not due to it, whatever a strongly
+/// nonlinear model, which may have several motions for one input, does with further noise.
+const FAR_MORE: f64 = 10.0;
 
 /// Records for comparing models with the noise on their applied quantity doubled: once with further noise added, once
 /// with it subtracted, so that its products with the existing noise cancel.
 pub struct NoisierRecords {
     added: Vec<StandRecord>,
     taken_off: Vec<StandRecord>,
+    /// Records of the noise alone, and of nothing measured.
+    alone: Vec<StandRecord>,
     /// Whether they are the training records, for which each model has initial states.
     are_fitted: bool,
 }
@@ -40,6 +46,7 @@ impl NoisierRecords {
         let mut found = Self {
             added: Vec::new(),
             taken_off: Vec::new(),
+            alone: Vec::new(),
             are_fitted,
         };
         let mut has_noise = false;
@@ -48,8 +55,17 @@ impl NoisierRecords {
             has_noise |= std > 0.0;
             let count = record.input.samples().len();
             let noise: Vec<f64> = (0..count).map(|_| std * random.normal()).collect();
-            found.added.push(with_noise(record, &noise, 1.0));
-            found.taken_off.push(with_noise(record, &noise, -1.0));
+            let with = |sign: f64| {
+                let samples = record.input.samples().iter().zip(&noise);
+                excited_by(record, samples.map(|(u, e)| u + sign * e).collect())
+            };
+            found.added.push(with(1.0));
+            found.taken_off.push(with(-1.0));
+            found.alone.push(StandRecord {
+                measured: Arc::new(vec![0.0; count]),
+                initial: InitialState::default(),
+                ..excited_by(record, noise)
+            });
         }
         has_noise.then_some(found)
     }
@@ -61,6 +77,9 @@ impl NoisierRecords {
             return true;
         };
         let gain = after.against(before).gain();
+        if gain > FAR_MORE * self.passed_by(before) {
+            return true;
+        }
         let of_noise = (noisy_before - noisy_after) - gain;
         of_noise <= MOSTLY * gain
     }
@@ -77,15 +96,24 @@ impl NoisierRecords {
         };
         Some(0.5 * (sum(&self.added)? + sum(&self.taken_off)?))
     }
+
+    /// Sum of squares of the response of a model's plain stand to the noise.
+    fn passed_by(&self, model: &ScoredModel) -> f64 {
+        let fitted = &model.fitted;
+        let (plain, values) = fitted.structure.reduced(&fitted.values, |_| false);
+        let chain = plain.model(&values).0;
+        let response = |record| raw_residual(&chain, record).map(|r| dot(&r, &r));
+        let sums: Result<Vec<f64>, _> = self.alone.iter().map(response).collect();
+        sums.map_or(f64::INFINITY, |sums| sums.iter().sum())
+    }
 }
 
-fn with_noise(record: &StandRecord, noise: &[f64], sign: f64) -> StandRecord {
+/// A record with another input.
+fn excited_by(record: &StandRecord, samples: Vec<f64>) -> StandRecord {
     let input = &record.input;
-    let samples = input.samples().iter().zip(noise);
-    let samples = samples.map(|(u, e)| u + sign * e).collect();
-    let noisier = Excitation::new(samples, input.rate_hz(), input.start_s(), input.substeps());
+    let other = Excitation::new(samples, input.rate_hz(), input.start_s(), input.substeps());
     StandRecord {
-        input: Arc::new(noisier.with_between(input.between())),
+        input: Arc::new(other.with_between(input.between())),
         ..record.clone()
     }
 }
