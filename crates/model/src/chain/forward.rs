@@ -170,8 +170,8 @@ impl Chain {
         actions.any(|action| matches!(action, Action::Distortion(_)))
     }
 
-    /// Mode of small free motions, with the relative stiffness `k` that torques add: `ω √(1 + k)` and `ζ/√(1 + k)`; the
-    /// first mode if there are several.
+    /// Mode of small free motions, with the relative stiffness `k` that torques and material damping add and the loss
+    /// factor `η` of the latter: `ω √(1 + k)` and `ζ/√(1 + k) + η/(2 (1 + k))`; the first mode if there are several.
     ///
     /// ```
     /// use torqcomp_model::{Chain, Link, Mode, effects::Effect};
@@ -182,18 +182,35 @@ impl Chain {
     /// let free = Chain::new(mode, 1.0).with_links([torque]).free_mode();
     /// assert!((free.omega_rad_s - 110.0).abs() < 1e-12);
     /// assert!((free.damping_ratio - 0.05).abs() < 1e-15);
+    /// let effect = Effect::named("structural-damping").unwrap();
+    /// let loss = Link::of(effect, &effect.forms[0], &[0.03]);
+    /// // 0.055 + 0.03/2.
+    /// let free = Chain::new(mode, 1.0).with_links([loss]).free_mode();
+    /// assert!((free.damping_ratio - 0.07).abs() < 1e-15);
     /// ```
     #[must_use]
     pub fn free_mode(&self) -> Mode {
         let plain = self.stand.first();
-        let stiffer = (1.0 + self.added_stiffness()).max(0.0).sqrt();
+        let added = self.added_stiffness() + self.material_stiffness(&plain);
+        let stiffer = (1.0 + added.re).max(0.0).sqrt();
         if stiffer == 0.0 {
             return plain;
         }
         Mode {
             omega_rad_s: plain.omega_rad_s * stiffer,
-            damping_ratio: plain.damping_ratio / stiffer,
+            damping_ratio: plain.damping_ratio / stiffer + 0.5 * added.im / (1.0 + added.re),
         }
+    }
+
+    /// Complex stiffness that material damping adds to a mode at its natural frequency, relative to that of the mode.
+    fn material_stiffness(&self, mode: &Mode) -> Complex64 {
+        let omega = mode.omega_rad_s;
+        let plain = mode.inverse(omega);
+        let added = self.links.iter().map(|link| match &link.action {
+            Action::Stiffness(change) => change(mode, omega, plain) - plain,
+            _ => Complex64::ZERO,
+        });
+        added.sum()
     }
 
     /// Stiffness that torques add at small displacements, relative to that of the plain stand.
@@ -275,7 +292,9 @@ impl Chain {
 
     fn apply(&self, action: &Action, signal: Signal, input: &Excitation) -> Signal {
         match action {
-            Action::Factor(factor) => multiply(signal, input, |omega| factor(&self.stand, omega)),
+            Action::Factor(_) | Action::Stiffness(_) => multiply(signal, input, |omega| {
+                action.factor(&self.stand, omega).unwrap_or(Complex64::ONE)
+            }),
             Action::Feedthrough(term) => {
                 let mut spectrum = signal.into_spectrum(input);
                 for (k, (y, u)) in spectrum.iter_mut().zip(input.spectrum()).enumerate() {

@@ -101,7 +101,10 @@ impl Link {
     pub fn is_linear(&self) -> bool {
         matches!(
             self.action,
-            Action::Factor(_) | Action::Feedthrough(_) | Action::Recorder { .. }
+            Action::Factor(_)
+                | Action::Stiffness(_)
+                | Action::Feedthrough(_)
+                | Action::Recorder { .. }
         )
     }
 
@@ -114,11 +117,11 @@ impl Link {
     /// Whether the impulse response of its inverse decays: the factor is continuous at DC, with a nonzero limit.
     #[must_use]
     pub fn dies_out(&self, stand: &ModalResponse) -> bool {
-        let Action::Factor(factor) = &self.action else {
+        let near_rest = NEAR_REST * stand.first().omega_rad_s;
+        let [at_rest, near] = [0.0, near_rest].map(|omega| self.action.factor(stand, omega));
+        let Some((at_rest, near)) = at_rest.zip(near) else {
             return true;
         };
-        let at_rest = factor(stand, 0.0);
-        let near = factor(stand, NEAR_REST * stand.first().omega_rad_s);
         // The limit is the same for both signs of frequency only if it is real.
         let step = (near - at_rest).norm().max(near.im.abs());
         at_rest.norm() > 0.0 && step < LARGEST_STEP * at_rest.norm()
@@ -127,21 +130,20 @@ impl Link {
     /// Whether it blocks constants.
     #[must_use]
     pub fn blocks_constants(&self, stand: &ModalResponse) -> bool {
-        let Action::Factor(factor) = &self.action else {
-            return false;
-        };
-        let at_resonance = factor(stand, stand.first().omega_rad_s);
-        factor(stand, 0.0).norm() < NONE_AT_REST * at_resonance.norm()
+        let resonance = stand.first().omega_rad_s;
+        let [at_rest, at_resonance] =
+            [0.0, resonance].map(|omega| self.action.factor(stand, omega));
+        let both = at_rest.zip(at_resonance);
+        both.is_some_and(|(rest, resonance)| rest.norm() < NONE_AT_REST * resonance.norm())
     }
 
     /// Its factor at a frequency; `before` is the response of the chain before it.
     fn factor(&self, before: Complex64, stand: &ModalResponse, frequency_hz: f64) -> Complex64 {
         let omega = TAU * frequency_hz;
         match &self.action {
-            Action::Factor(factor) => factor(stand, omega),
             Action::Feedthrough(term) => 1.0 + term(stand, omega) / before,
             Action::Recorder { response, .. } => response(frequency_hz),
-            _ => Complex64::ONE,
+            action => action.factor(stand, omega).unwrap_or(Complex64::ONE),
         }
     }
 }

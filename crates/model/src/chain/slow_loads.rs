@@ -48,7 +48,6 @@ impl Chain {
         let clock = SampleClock { step_s: 0.0 };
         for link in self.links.iter().filter(|link| link.stage > Stage::Stand) {
             match &link.action {
-                Action::Factor(factor) => scale(&mut record, factor(&self.stand, 0.0)),
                 Action::Recorder { response, .. } => scale(&mut record, response(0.0)),
                 Action::Feedthrough(term) => {
                     let past = self.gain * term(&self.stand, 0.0).re;
@@ -57,7 +56,11 @@ impl Chain {
                     }
                 }
                 Action::Distortion(distortion) => distortion.forward(clock, &mut record),
-                Action::Torque { .. } | Action::Lines(_) | Action::Course(_) => {}
+                action => {
+                    if let Some(factor) = action.factor(&self.stand, 0.0) {
+                        scale(&mut record, factor);
+                    }
+                }
             }
         }
         record

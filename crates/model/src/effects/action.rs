@@ -6,9 +6,14 @@ use num_complex::Complex64;
 
 use super::lines::SpectralLine;
 use crate::modal::ModalResponse;
+use crate::mode::Mode;
 
 /// A function of the plain stand and the angular frequency in rad/s.
 pub type Frequency = Box<dyn Fn(&ModalResponse, f64) -> Complex64 + Send + Sync>;
+
+/// A change of the dynamic stiffness of each mode: a function of the mode, the angular frequency in rad/s, and its
+/// `1 − (ω/ω₀)² + 2jζ ω/ω₀`.
+pub type Stiffness = Box<dyn Fn(&Mode, f64, Complex64) -> Complex64 + Send + Sync>;
 
 /// A known response that is not fitted, such as that of the recorder, as a function of frequency in
 /// Hz.
@@ -40,6 +45,8 @@ pub enum Action {
     },
     /// A factor of the response.
     Factor(Frequency),
+    /// A change of the stiffness, which also changes how the stand rings.
+    Stiffness(Stiffness),
     /// A term of the response past the stand: the applied quantity couples directly into the
     /// record.
     Feedthrough(Frequency),
@@ -195,11 +202,26 @@ impl Action {
         }
     }
 
+    /// Its factor of the response of a stand at an angular frequency in rad/s, if it is one.
+    #[must_use]
+    pub fn factor(&self, stand: &ModalResponse, omega_rad_s: f64) -> Option<Complex64> {
+        match self {
+            Self::Factor(factor) => Some(factor(stand, omega_rad_s)),
+            Self::Stiffness(change) => {
+                let changed = |mode: &Mode, plain| change(mode, omega_rad_s, plain);
+                Some(stand.inverse(omega_rad_s) / stand.inverse_with(omega_rad_s, changed))
+            }
+            _ => None,
+        }
+    }
+
     /// Treatment in a compensation.
     #[must_use]
     pub fn treatment(&self) -> Treatment {
         match self {
-            Self::Factor(_) | Self::Feedthrough(_) | Self::Recorder { .. } => Treatment::DividedOut,
+            Self::Factor(_) | Self::Stiffness(_) | Self::Feedthrough(_) | Self::Recorder { .. } => {
+                Treatment::DividedOut
+            }
             Self::Lines(_) | Self::Course(_) => Treatment::Subtracted,
             Self::Distortion(distortion) => distortion.treatment(),
             Self::Torque { torque, .. } if torque.begin(1.0) == [0.0; 2] => Treatment::Inverted,
@@ -213,6 +235,7 @@ impl std::fmt::Debug for Action {
         f.write_str(match self {
             Self::Torque { .. } => "Torque",
             Self::Factor(_) => "Factor",
+            Self::Stiffness(_) => "Stiffness",
             Self::Feedthrough(_) => "Feedthrough",
             Self::Recorder { .. } => "Recorder",
             Self::Distortion(_) => "Distortion",

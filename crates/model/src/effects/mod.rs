@@ -44,7 +44,8 @@ mod time_delay;
 
 pub use crate::mode::Mode;
 pub use action::{
-    Action, Distortion, Fixed, Frequency, Memory, SampleClock, Torque, Treatment, Unrecovered,
+    Action, Distortion, Fixed, Frequency, Memory, SampleClock, Stiffness, Torque, Treatment,
+    Unrecovered,
 };
 pub(crate) use backlash::bridge;
 pub use capacitive_coupling::level;

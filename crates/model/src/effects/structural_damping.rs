@@ -27,7 +27,7 @@ pub(super) static EFFECT: Effect = Effect {
             starts: &[&[0.02]],
             build: |p| {
                 let eta = p[0];
-                factor(move |_, omega, plain| match omega == 0.0 {
+                stiffness(move |_, omega, plain| match omega == 0.0 {
                     true => plain,
                     false => plain + Complex64::new(0.0, eta.copysign(omega)),
                 })
@@ -41,7 +41,7 @@ pub(super) static EFFECT: Effect = Effect {
             starts: &[&[0.02]],
             build: |p| {
                 let order = p[0];
-                factor(move |mode, omega, plain| {
+                stiffness(move |mode, omega, plain| {
                     // The static stiffness of a springpot is zero: far below the band it is
                     // clamped.
                     let w = (omega / mode.omega_rad_s).abs().max(1e-4);
@@ -61,7 +61,7 @@ pub(super) static EFFECT: Effect = Effect {
             starts: &[&[0.02, 1.0]],
             build: |p| {
                 let (order, ratio) = (p[0], p[1]);
-                factor(move |mode, omega, plain| {
+                stiffness(move |mode, omega, plain| {
                     let w = (omega / mode.omega_rad_s).abs().max(1e-4);
                     let turn = (0.5 * std::f64::consts::PI * order).copysign(omega);
                     plain - 1.0 + Complex64::from_polar(ratio * w.powf(order), turn)
@@ -71,9 +71,8 @@ pub(super) static EFFECT: Effect = Effect {
     ],
 };
 
-/// A factor that modifies the `1 − (ω/ω₀)² + 2jζ ω/ω₀` of every mode of the stand.
-fn factor(change: impl Fn(&Mode, f64, Complex64) -> Complex64 + Send + Sync + 'static) -> Action {
-    Action::Factor(Box::new(move |stand, omega| {
-        stand.inverse(omega) / stand.inverse_with(omega, |mode, plain| change(mode, omega, plain))
-    }))
+fn stiffness(
+    change: impl Fn(&Mode, f64, Complex64) -> Complex64 + Send + Sync + 'static,
+) -> Action {
+    Action::Stiffness(Box::new(change))
 }
