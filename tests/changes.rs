@@ -103,3 +103,25 @@ fn a_stiffness_that_swings_slowly_is_no_coloured_noise() {
         assert_eq!(report["verdict"], "unexplained", "{described}");
     }
 }
+
+/// An unbalanced rotor that speeds up shakes the stand: nothing of it repeats with the input, so that it would pass for
+/// noise, and no effect of the list is its cause.
+#[test]
+fn an_order_of_a_changing_speed_is_said() {
+    let length_s = SAMPLES as f64 / RATE_HZ;
+    let turns = |t: f64| NATURAL_HZ * (1.3 + t / length_s) * t;
+    let (report, _) = diagnosed(|t, _, _| 0.06 * (TAU * turns(t)).sin());
+    let line = &report["residual"]["tests"]["moving_line"];
+    assert_eq!(report["verdict"], "unexplained", "{line}");
+    let off = |key: &str, expected: f64| (number(&line[key]) / NATURAL_HZ - expected).abs();
+    // The last 30 % of the record are held out.
+    assert!(
+        off("from_hz", 2.7) < 0.2 && off("to_hz", 3.3) < 0.2,
+        "{line}"
+    );
+    let next = &report["next_experiment"];
+    assert_eq!(
+        next,
+        "the same record at a constant speed, or with the motor off"
+    );
+}

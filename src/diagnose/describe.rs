@@ -67,6 +67,14 @@ pub fn residual(
             }
         ));
     }
+    parts.extend(tests.moving_line.as_ref().map(|line| {
+        format!(
+            "a line that moves from {} to {} Hz, with {:.0} % of the power: an order of a speed that changes",
+            rounded(line.from_hz, 3),
+            rounded(line.to_hz, 3),
+            100.0 * line.share
+        )
+    }));
     if !found.settled && !found.after.effect_names().is_empty() {
         parts.push(
             "the effect found switches so fast that the integration step adds to the error; no second effect was tried"
@@ -145,6 +153,9 @@ pub fn next_experiment(
     }
     if let Some(surface) = surface {
         return Some(surface.experiment().to_owned());
+    }
+    if found.tests.moving_line.is_some() {
+        return Some("the same record at a constant speed, or with the motor off".to_owned());
     }
     if found.tests.nonstationary().is_some() {
         return Some(

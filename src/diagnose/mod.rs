@@ -27,6 +27,7 @@ mod known_loads;
 mod ladder;
 mod levels;
 mod moment;
+mod moving_line;
 mod noise_floor;
 mod operation;
 mod own_of_records;

@@ -6,6 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use torqcomp_model::Mode;
 
 use super::fit::RecordResidual;
+use super::moving_line::MovingLine;
 use super::spectra::coherent_share;
 use super::stationarity;
 use torqcomp_dsp::dot;
@@ -64,6 +65,8 @@ pub struct ResidualTests {
     pub with_slope: PowerShare,
     /// Share at the lowest frequencies, above the noise at these.
     pub wandering_zero: PowerShare,
+    /// A line whose frequency changes over a record; `null` if there is none.
+    pub moving_line: Option<MovingLine>,
 }
 
 impl ResidualTests {
@@ -82,6 +85,7 @@ impl ResidualTests {
             with_signal: stationarity::with_signal(residuals),
             with_slope: stationarity::with_slope(residuals),
             wandering_zero: stationarity::wandering_zero(residuals),
+            moving_line: MovingLine::of(residuals),
         }
     }
 
@@ -93,7 +97,7 @@ impl ResidualTests {
 
     /// Whether any test detects a dependence on input, motion or time.
     pub fn follows_anything(&self) -> bool {
-        let is_seen = self.dependence().is_some() || self.nonstationary().is_some();
+        let is_seen = self.dependence().is_some() || self.changes();
         is_seen || self.has_spikes() || !self.independent_of_input
     }
 
@@ -111,6 +115,11 @@ impl ResidualTests {
         let mut both = [changing, zero, signal, slope].into_iter().zip(least);
         let found = both.find(|(s, least)| s.exceeds([*least, NONSTATIONARY]));
         found.map(|(share, _)| share)
+    }
+
+    /// Whether anything changes over a record.
+    pub fn changes(&self) -> bool {
+        self.nonstationary().is_some() || self.moving_line.is_some()
     }
 
     /// Whether the zero drifts.

@@ -179,7 +179,7 @@ impl SearchState {
     /// them.
     fn leaves(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
         let is_above = remains(model, tests, self.noise_floor);
-        is_above && !self.is_coloured_noise(model, tests) || tests.nonstationary().is_some()
+        is_above && !self.is_coloured_noise(model, tests) || tests.changes()
     }
 
     /// Whether the residual of the plain stand exceeds the noise floor only because that assumes white noise: no test
