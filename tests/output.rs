@@ -188,9 +188,13 @@ fn wait_for_outputs(folder: &Folder, child: &std::process::Child, count: usize) 
         let deleted = links.filter(|to| to.to_string_lossy().ends_with(" (deleted)"));
         deleted.filter(|to| to.starts_with(folder.path(""))).count()
     };
-    while named().max(unnamed()) < count {
+    for _ in 0..1000 {
+        if named().max(unnamed()) >= count {
+            return;
+        }
         std::thread::sleep(std::time::Duration::from_millis(10));
     }
+    panic!("no {count} outputs in {:?}", folder.names());
 }
 
 #[cfg(unix)]

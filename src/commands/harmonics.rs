@@ -260,12 +260,7 @@ fn fit(
     let (reference, start_s) = phase_reference(record.start, duration_s);
     let mut found = harmonics::fit(samples, record.rate_hz, start_s, fundamental, &orders)?;
     let seen = samples.part(0..samples.count().min(excerpt::OF_PASSES))?;
-    rounding::add_rounding(
-        &mut found.components,
-        &seen,
-        samples.count(),
-        record.rate_hz,
-    );
+    rounding::add_rounding(&mut found, &seen, record);
 
     let chain = &way.chain;
     let printed = 1.0 / chain.applied.factor;

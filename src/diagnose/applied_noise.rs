@@ -28,7 +28,7 @@ const FAR_MORE: f64 = 10.0;
 pub struct NoisierRecords {
     added: Vec<StandRecord>,
     taken_off: Vec<StandRecord>,
-    /// Records of the noise alone, and of nothing measured.
+    /// Records whose input is the noise alone and whose measured quantity is zero.
     alone: Vec<StandRecord>,
     /// Whether they are the training records, for which each model has initial states.
     are_fitted: bool,
@@ -72,14 +72,14 @@ impl NoisierRecords {
 
     /// Whether a model explains more than another beyond removing the response to noise on the applied quantity.
     pub fn bear_out(&self, before: &ScoredModel, after: &ScoredModel) -> bool {
-        let [Some(noisy_before), Some(noisy_after)] = [before, after].map(|m| self.left_by(m))
-        else {
-            return true;
-        };
         let gain = after.against(before).gain();
         if gain > FAR_MORE * self.passed_by(before) {
             return true;
         }
+        let [Some(noisy_before), Some(noisy_after)] = [before, after].map(|m| self.left_by(m))
+        else {
+            return true;
+        };
         let of_noise = (noisy_before - noisy_after) - gain;
         of_noise <= MOSTLY * gain
     }

@@ -48,12 +48,7 @@ pub fn residual(
         parts.push("larger in the records with larger motion, unlike noise".to_owned());
     }
     parts.extend(dependence(tests));
-    if tests.has_spikes() {
-        parts.push(format!(
-            "{:.0} % of its power is in 1 % of its samples: spikes",
-            100.0 * tests.in_largest_hundredth
-        ));
-    }
+    parts.extend(spikes(tests));
     if let Some(share) = tests.nonstationary() {
         let is_hidden = |source| source == NoiseFloorSource::Periods;
         let is_hidden = found.noise_floor.is_some_and(|f| is_hidden(f.from));
@@ -67,14 +62,7 @@ pub fn residual(
             }
         ));
     }
-    parts.extend(tests.moving_line.as_ref().map(|line| {
-        format!(
-            "a line that moves from {} to {} Hz, with {:.0} % of the power: an order of a speed that changes",
-            rounded(line.from_hz, 3),
-            rounded(line.to_hz, 3),
-            100.0 * line.share
-        )
-    }));
+    parts.extend(moving_line(tests));
     if !found.settled && !found.after.effect_names().is_empty() {
         parts.push(
             "the effect found switches so fast that the integration step adds to the error; no second effect was tried"
@@ -87,6 +75,32 @@ pub fn residual(
     let line = |line: &SpectralLine| format!("a line at {} Hz", rounded(line.frequency_hz, 5));
     parts.extend(lines.iter().map(line));
     parts.join("; ")
+}
+
+/// Spikes of the residual.
+fn spikes(tests: &ResidualTests) -> Option<String> {
+    let at = tests.spike_rate_hz.map_or_else(String::new, |rate_hz| {
+        let rate_hz = rounded(rate_hz, 4);
+        format!(", {rate_hz} per second, as from a switching drive or a commutator")
+    });
+    tests.has_spikes().then(|| {
+        format!(
+            "{:.0} % of its power is in 1 % of its samples: spikes{at}",
+            100.0 * tests.in_largest_hundredth
+        )
+    })
+}
+
+/// A line of the residual that moves.
+fn moving_line(tests: &ResidualTests) -> Option<String> {
+    tests.moving_line.as_ref().map(|line| {
+        format!(
+            "a line that moves from {} to {} Hz, with {:.0} % of the power: an order of a speed that changes",
+            rounded(line.from_hz, 3),
+            rounded(line.to_hz, 3),
+            100.0 * line.share
+        )
+    })
 }
 
 /// Dependence of the residual.
@@ -153,6 +167,13 @@ pub fn next_experiment(
     }
     if let Some(surface) = surface {
         return Some(surface.experiment().to_owned());
+    }
+    if found.tests.spike_rate_hz.is_some() {
+        return Some(
+            "the same record with the motor's supply off, or with its cables away from those of the gage: are the spikes \
+             still there?"
+                .to_owned(),
+        );
     }
     if found.tests.moving_line.is_some() {
         return Some("the same record at a constant speed, or with the motor off".to_owned());

@@ -49,6 +49,7 @@ mod several_modes;
 mod shift;
 mod special_cases;
 mod spectra;
+mod spike_train;
 mod starts;
 mod stationarity;
 mod structure;

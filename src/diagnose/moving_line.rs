@@ -16,8 +16,10 @@ const SHORTEST: usize = 64;
 const LOBE: usize = 2;
 /// Median share of a segment's power that is in its strongest line. Of white noise it is a few per cent.
 const MOSTLY: f64 = 0.5;
-/// Minimum change of frequency over the record, and maximum change from a segment to the next, in bins.
+/// Minimum change of frequency over the record, of an input that may cause it, and maximum change from a segment to the
+/// next, in bins.
 const MOVED: f64 = 4.0;
+const MOVED_INPUT: f64 = 1.0;
 const JUMP: f64 = 2.0;
 
 /// A line that moves.
@@ -32,35 +34,42 @@ pub struct MovingLine {
 }
 
 impl MovingLine {
-    /// The first one in the residuals of some records whose input is not such a line itself.
+    /// The first one in the residuals of some records. That of a free decay, or of a swept input, which moves by several
+    /// times as much, follows from the stand.
     pub fn of(residuals: &[RecordResidual]) -> Option<Self> {
-        let is_swept =
-            |r: &RecordResidual| Self::in_any(r.record.applied_in_range(), 1.0).is_some();
+        let is_swept = |r: &RecordResidual| {
+            let input = r.record.applied_in_range();
+            Self::in_any(input, r.record.rate_hz(), MOVED_INPUT).is_some()
+        };
         let mut found = residuals.iter().filter_map(|r| {
-            let line = Self::in_any(&r.samples, r.record.rate_hz())?;
-            (!is_swept(r)).then_some(line)
+            let line = Self::in_any(&r.samples, r.record.rate_hz(), MOVED)?;
+            (!r.record.is_free() && !is_swept(r)).then_some(line)
         });
         found.next()
     }
 
     /// The clearest one for any number of segments.
-    fn in_any(samples: &[f64], rate_hz: f64) -> Option<Self> {
+    fn in_any(samples: &[f64], rate_hz: f64, moved: f64) -> Option<Self> {
         let found = SEGMENTS.into_iter().filter_map(|count| {
             // They overlap by half.
             let length = 2 * (samples.len() / (count + 1));
-            (length >= SHORTEST).then(|| Self::in_segments(samples, length, rate_hz))?
+            (length >= SHORTEST).then(|| Self::in_segments(samples, length, rate_hz, moved))?
         });
         found.max_by(|a, b| a.share.total_cmp(&b.share))
     }
 
-    fn in_segments(samples: &[f64], length: usize, rate_hz: f64) -> Option<Self> {
+    fn in_segments(samples: &[f64], length: usize, rate_hz: f64, moved: f64) -> Option<Self> {
         let strongest = |segment: &Vec<_>| {
             let power: Vec<f64> = segment
                 .iter()
                 .map(num_complex::Complex64::norm_sqr)
                 .collect();
             let last = power.len() - 1;
-            let lobe = |k: usize| power[k - LOBE..=(k + LOBE).min(last)].iter().sum::<f64>();
+            let lobe = |k: usize| {
+                power[(k - LOBE).max(1)..=(k + LOBE).min(last)]
+                    .iter()
+                    .sum::<f64>()
+            };
             let peak = (LOBE..=last).max_by(|a, b| power[*a].total_cmp(&power[*b]))?;
             // Whatever is slower is a drift.
             let whole: f64 = power[1..].iter().sum();
@@ -75,7 +84,7 @@ impl MovingLine {
         let mut steps = bins.windows(2).map(|pair| direction * (pair[1] - pair[0]));
         let is_steady = steps.all(|step| (-1.0..=JUMP).contains(&step));
         let to_hz = rate_hz / length as f64;
-        (share > MOSTLY && is_steady && (last - first).abs() >= MOVED).then_some(Self {
+        (share > MOSTLY && is_steady && (last - first).abs() >= moved).then_some(Self {
             from_hz: first * to_hz,
             to_hz: last * to_hz,
             share,
@@ -102,15 +111,15 @@ mod tests {
     fn a_run_up_is_seen_and_steady_lines_and_noise_are_not() {
         // From 20 Hz to 20 + 2·12·4 = 116 Hz.
         let run_up = record(|t| (TAU * (20.0 + 12.0 * t) * t).sin());
-        let found = MovingLine::in_any(&run_up, RATE_HZ).unwrap();
+        let found = MovingLine::in_any(&run_up, RATE_HZ, MOVED).unwrap();
         let far = |found: f64, hz: f64| (found - hz).abs() > 8.0;
         assert!(
             !far(found.from_hz, 20.0) && !far(found.to_hz, 116.0),
             "{found:?}"
         );
         let down = run_up.iter().rev().copied().collect::<Vec<_>>();
-        assert!(MovingLine::in_any(&down, RATE_HZ).unwrap().to_hz < 30.0);
-        assert!(MovingLine::in_any(&record(|t| (TAU * 70.0 * t).sin()), RATE_HZ).is_none());
+        assert!(MovingLine::in_any(&down, RATE_HZ, MOVED).unwrap().to_hz < 30.0);
+        assert!(MovingLine::in_any(&record(|t| (TAU * 70.0 * t).sin()), RATE_HZ, MOVED).is_none());
         for seed in 0..200 {
             let mut random = noise(seed);
             // White, and ringing with a bandwidth of a few Hz.
@@ -123,7 +132,10 @@ mod tests {
             };
             let ringing: Vec<f64> = white.iter().map(ring).collect();
             for samples in [white, ringing] {
-                assert!(MovingLine::in_any(&samples, RATE_HZ).is_none(), "{seed}");
+                assert!(
+                    MovingLine::in_any(&samples, RATE_HZ, MOVED).is_none(),
+                    "{seed}"
+                );
             }
         }
     }

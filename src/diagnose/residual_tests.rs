@@ -8,6 +8,7 @@ use torqcomp_model::Mode;
 use super::fit::RecordResidual;
 use super::moving_line::MovingLine;
 use super::spectra::coherent_share;
+use super::spike_train::spike_rate_hz;
 use super::stationarity;
 use torqcomp_dsp::dot;
 
@@ -55,6 +56,8 @@ pub struct ResidualTests {
     pub largest_lag: i64,
     /// Part of the power in the largest hundredth of the samples.
     pub in_largest_hundredth: f64,
+    /// Rate of spikes at equal intervals, in Hz; `null` if there are none.
+    pub spike_rate_hz: Option<f64>,
     /// Shares of the power that follow from the input or the motion.
     pub shares: Vec<PowerShare>,
     /// Share removed by fitting constants to each segment of the record.
@@ -73,13 +76,16 @@ impl ResidualTests {
     /// Tests the residuals of records of a stand with that mode.
     pub fn of(residuals: &[RecordResidual], mode: &Mode) -> Self {
         let (white, whiteness_ratio) = whiteness(residuals);
+        let in_largest_hundredth = in_largest_hundredth(residuals);
+        let has_spikes = in_largest_hundredth > SPIKES;
         let (independent_of_input, largest_lag) = input_independence(residuals);
         Self {
             white,
             whiteness_ratio,
             independent_of_input,
             largest_lag,
-            in_largest_hundredth: in_largest_hundredth(residuals),
+            in_largest_hundredth,
+            spike_rate_hz: has_spikes.then(|| spike_rate_hz(residuals)).flatten(),
             shares: shares(residuals, mode),
             changing_constants: stationarity::changing_constants(residuals, mode),
             with_signal: stationarity::with_signal(residuals),

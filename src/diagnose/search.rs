@@ -117,7 +117,6 @@ pub struct SearchEffort {
     pub promising: f64,
 }
 
-/// The second start of a first effect rarely leads farther than the first, and hardly ever beside other effects.
 pub const FOR_FIRST_EFFECT: SearchEffort = SearchEffort {
     starts: 2,
     first: usize::MAX,
@@ -125,7 +124,7 @@ pub const FOR_FIRST_EFFECT: SearchEffort = SearchEffort {
     full: 12,
     promising: 0.5,
 };
-/// With an accepted effect, the gain of a first fit predicts that of the last one less well: all parameters must move
+/// The second start of a form hardly ever leads farther than the first here. With an accepted effect, the gain of a first fit predicts that of the last one less well: all parameters must move
 /// together.
 const FOR_SECOND_EFFECT: SearchEffort = SearchEffort {
     starts: 1,

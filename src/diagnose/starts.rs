@@ -47,7 +47,7 @@ impl Start {
     }
 }
 
-/// The starts with the smallest residuals, at most `most`: each as given and with the magnitude suggested by the
+/// The starts with the smallest residuals, at most `most` and that from the backbone of free decays: each as given and with the magnitude suggested by the
 /// residual.
 pub fn best_starts(
     base: &BaseModel,

@@ -12,6 +12,7 @@ pub enum Call {
     Open,
     Create,
     /// Of a file without a name, which not every system has.
+    #[cfg_attr(not(target_os = "linux"), allow(dead_code))]
     Unnamed,
     Read,
     Write,

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::parts::{self, Part};
+use tempfile::TempPath;
+
+use super::parts::{self, Unfinished};
 use super::{standard_output, storage, sum};
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::{ShowPath, is_dash};
@@ -41,7 +43,7 @@ enum Kind {
     /// An existing pipe or device, without renaming.
     Device(File),
     File {
-        part: Part,
+        part: Unfinished,
         path: PathBuf,
         policy: Policy,
     },
@@ -109,8 +111,8 @@ impl Output {
             }
             found => {
                 let path = end_of_links(path);
-                let part =
-                    Part::create_in(folder_of(&path)).map_err(|e| folder_failure(&path, &e))?;
+                let part = Unfinished::create_in(folder_of(&path))
+                    .map_err(|e| folder_failure(&path, &e))?;
                 if let Ok(meta) = found {
                     // The permissions of a replaced file are preserved.
                     let kept = part.file().set_permissions(meta.permissions());
@@ -218,7 +220,12 @@ pub fn finish_all(outputs: impl IntoIterator<Item = Output>) -> Result<(), Failu
         Kind::File { part, path, policy } => Some((output.name, part, path, policy)),
         _ => None,
     });
-    let files: Vec<_> = files.collect();
+    // Names are given before the first file is replaced: where that takes a copy, it may fail.
+    let named = files.map(|(name, part, path, policy)| match part.named() {
+        Ok(part) => Ok((name, part, path, policy)),
+        Err(error) => Err(Failure::writing(&name, &error)),
+    });
+    let files: Vec<_> = named.collect::<Result<_, _>>()?;
     let several = files.len() > 1;
     let mut done: Vec<Renamed> = Vec::new();
     for (name, part, path, policy) in files {
@@ -240,19 +247,19 @@ struct Renamed {
     /// Whether nothing of that name existed before.
     is_new: bool,
     /// The replaced file, kept under another name while it may have to be restored.
-    replaced: Option<tempfile::TempPath>,
+    replaced: Option<TempPath>,
     sync: bool,
 }
 
 impl Renamed {
-    fn new(part: Part, path: PathBuf, policy: Policy, keep: bool) -> io::Result<Self> {
+    fn new(part: TempPath, path: PathBuf, policy: Policy, keep: bool) -> io::Result<Self> {
         let is_new = std::fs::symlink_metadata(&path).is_err();
         let replaced = match keep && !is_new {
             // `None` if the file system has no links.
             true => parts::second_name(&path, folder_of(&path)).ok(),
             false => None,
         };
-        storage::rename(part.named()?, &path, policy.replace)?;
+        storage::rename(part, &path, policy.replace)?;
         Ok(Self {
             path,
             is_new,

@@ -84,13 +84,13 @@ fn is_ignored(signal: i32) -> bool {
 
 /// A file in a folder that gets its name when it is complete. Until then it has none, so that nothing is left of it however
 /// the process ends; where the system has no such files, a temporary one, and it is removed unless it is completed.
-pub struct Part {
+pub struct Unfinished {
     file: File,
     name: Option<TempPath>,
     folder: PathBuf,
 }
 
-impl Part {
+impl Unfinished {
     /// Creates it.
     pub fn create_in(folder: &Path) -> io::Result<Self> {
         if is_first_in(folder) {

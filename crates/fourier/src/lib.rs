@@ -38,7 +38,7 @@ pub fn inverse(length: usize) -> Arc<dyn ComplexToReal<f64>> {
 /// Samples after which a rotating phasor is computed anew, which limits its rounding error.
 const TURNS: usize = 4096;
 
-/// `e^{iφn}` for `n = first, first + 1, …`, to about 1e-12.
+/// `e^{iφn}` for `n = first, first + 1, …`, to about 1e-12 beside the rounding of `φn`.
 ///
 /// ```
 /// // A quarter of a turn per sample: i, −1, −i, 1.

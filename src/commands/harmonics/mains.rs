@@ -9,6 +9,17 @@ const MAINS_LINES: f64 = 5.0;
 /// Mains frequencies.
 const GRIDS_HZ: [f64; 2] = [50.0, 60.0];
 
+/// The mains of which a line is at a frequency, as far as a record of that duration shows it.
+pub(super) fn grids_with_a_line_at(
+    frequency_hz: f64,
+    duration_s: f64,
+) -> impl Iterator<Item = f64> {
+    GRIDS_HZ.into_iter().filter(move |grid_hz| {
+        let line_hz = (frequency_hz / grid_hz).round().clamp(1.0, MAINS_LINES) * grid_hz;
+        (frequency_hz - line_hz).abs() < 1.0 / duration_s
+    })
+}
+
 /// Orders at the frequencies of mains lines, indistinguishable in one record. If the fundamental is that of the mains,
 /// one warning is given.
 pub(super) fn warning(components: &[ComponentTorque], duration_s: f64) -> Option<Warning> {
@@ -27,11 +38,8 @@ pub(super) fn warning(components: &[ComponentTorque], duration_s: f64) -> Option
         .iter()
         .filter(|c| c.order > 1.0 && c.torque > 5.0 * c.std)
         .filter(|c| {
-            GRIDS_HZ.iter().any(|grid_hz| {
-                let line = (c.frequency_hz / grid_hz).round().clamp(1.0, MAINS_LINES) * grid_hz;
-                let slower = c.frequency_hz / c.order < 0.9 * grid_hz;
-                slower && (c.frequency_hz - line).abs() < 1.0 / duration_s
-            })
+            let is_slower = |grid_hz: f64| c.frequency_hz / c.order < 0.9 * grid_hz;
+            grids_with_a_line_at(c.frequency_hz, duration_s).any(is_slower)
         })
         .map(|c| format!("{} ({:.2} Hz)", short(c.order), c.frequency_hz))
         .collect();

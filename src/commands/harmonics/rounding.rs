@@ -2,8 +2,11 @@
 
 use std::f64::consts::SQRT_2;
 
-use torqcomp_dsp::harmonics::Component;
+use torqcomp_dsp::harmonics::Harmonics;
 use torqcomp_dsp::quality::quantisation::quantisation;
+use torqcomp_dsp::store::SampleStore;
+
+use crate::recording::{Spool, UniformRecord};
 
 /// Standard deviation of a number rounded to whole steps, in steps: `1/√12`.
 const OF_A_STEP: f64 = 0.288_675_134_594_812_9;
@@ -13,24 +16,20 @@ const MISSING: f64 = 0.5;
 
 /// Adds what rounding contributes where the surroundings of the components do not show it. With noise of half a step or
 /// more, the errors of rounding are spread like noise, `q √(2/12N)` in each amplitude (B. Widrow and I. Kollár,
-/// *Quantization Noise*, Cambridge 2008, chapter 20). In a quieter record that repeats after the `P` samples of a period,
+/// *Quantization Noise*, Cambridge 2008). In a quieter record that repeats after the `P` samples of a period,
 /// they repeat as well and are all in the orders: up to `q √(2/12P)`, however long the record.
-pub(super) fn add_rounding(
-    components: &mut [Component],
-    samples: &[f64],
-    count: usize,
-    rate_hz: f64,
-) {
-    let Some(found) = quantisation(samples) else {
+pub(super) fn add_rounding(fitted: &mut Harmonics, seen: &[f64], record: &UniformRecord<Spool>) {
+    let Some(found) = quantisation(seen) else {
         return;
     };
     let std = OF_A_STEP * found.step;
-    for component in components {
-        let spread = std * SQRT_2 / (count as f64).sqrt();
+    let count = record.samples.count() as f64;
+    for component in &mut fitted.components {
+        let spread = std * SQRT_2 / count.sqrt();
         if component.std_amplitude >= MISSING * spread {
             continue;
         }
-        let period = (rate_hz * component.order / component.frequency_hz).min(count as f64);
+        let period = (record.rate_hz * component.order / component.frequency_hz).min(count);
         component.add_std(std * SQRT_2 / period.sqrt());
     }
 }

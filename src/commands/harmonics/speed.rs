@@ -3,6 +3,7 @@
 use torqcomp_dsp::harmonics::{Component, Fundamental, Harmonics, fit, refine_fundamental};
 use torqcomp_dsp::store::SampleStore;
 
+use super::mains::grids_with_a_line_at;
 use crate::cli::REFINE_SPAN;
 use crate::print::rounded;
 use crate::recording::{Spool, UniformRecord};
@@ -53,7 +54,8 @@ pub(super) fn off(
     let within = |span: f64| {
         let found = refine_fundamental(&samples[..], rate_hz, fundamental_hz, span, orders).ok()?;
         let better = of(Fundamental::given(found.frequency_hz))?;
-        let is_there = better.components.iter().any(is_sure) && !is_attracted(&given, &better);
+        let is_there = better.components.iter().any(is_sure)
+            && !is_attracted(&given, &better, length as f64 / rate_hz);
         let rest = better.residual_rms.powi(2);
         let lost = given.residual_rms.powi(2) - rest;
         let shift_hz = (found.frequency_hz - fundamental_hz).abs();
@@ -120,7 +122,9 @@ pub(super) fn warning(
             fit(&changes[..], record.rate_hz, 0.0, fundamental, orders).ok()
         };
         let both = at(fundamental_hz).zip(at(found.frequency_hz));
-        let is_attracted = both.is_some_and(|(given, found)| is_attracted(&given, &found));
+        let duration_s = length as f64 / record.rate_hz;
+        let is_attracted =
+            both.is_some_and(|(given, found)| is_attracted(&given, &found, duration_s));
         Some((found, is_attracted))
     };
     let with = |span, length| -> Option<Vec<(Fundamental, bool)>> {
@@ -130,7 +134,12 @@ pub(super) fn warning(
     // A speed that is not found may change so fast that a line exists over a few periods only.
     let few = (FEWEST * record.rate_hz / fundamental_hz) as usize;
     let found = with(SPAN, length).or_else(|| with(WIDE_SPAN, few))?;
-    if found.iter().any(|(_, is_attracted)| *is_attracted) {
+    if 2 * found
+        .iter()
+        .filter(|(_, is_attracted)| *is_attracted)
+        .count()
+        > PARTS
+    {
         return None;
     }
     let found: Vec<Fundamental> = found.into_iter().map(|(found, _)| found).collect();
@@ -183,21 +192,7 @@ pub(super) fn sways(
     let samples = record.samples.part(0..count).ok()?;
     let fundamental = Fundamental::given(fundamental_hz);
     let whole = fit(&samples[..], rate_hz, 0.0, fundamental, orders).ok()?;
-    let length = count / windows;
-    // By each order in each window: the angle and its variance.
-    let shown = (0..windows).map(|window| {
-        let start = window * length;
-        let part = &samples[start..start + length];
-        let here = fit(part, rate_hz, start as f64 / rate_hz, fundamental, orders).ok()?;
-        let pairs = whole.components.iter().zip(&here.components);
-        let by_order = pairs.map(|(mean, here)| {
-            let turned = (here.phasor * mean.phasor.conj()).arg();
-            let std_rad = here.std_amplitude / here.phasor.norm();
-            is_sure(here).then(|| [turned / here.order, (std_rad / here.order).powi(2)])
-        });
-        Some(by_order.collect())
-    });
-    let shown: Vec<Vec<Option<[f64; 2]>>> = shown.collect::<Option<_>>()?;
+    let shown = angles_by_order(&samples, rate_hz, fundamental, &whole, windows)?;
     let mean_angle = |angles: &Vec<Option<[f64; 2]>>| {
         let sure = angles.iter().flatten();
         let sums = sure.fold([0.0; 2], |[sum, weights], [angle, variance]| {
@@ -237,15 +232,44 @@ pub(super) fn sways(
 }
 
 /// Whether an order that is significant at the given speed is not at the one found: a strong line that is no order has
-/// attracted another.
-fn is_attracted(given: &Harmonics, found: &Harmonics) -> bool {
+/// attracted another. An order at the mains may be their line, which a wrong speed hits by chance.
+fn is_attracted(given: &Harmonics, found: &Harmonics, duration_s: f64) -> bool {
+    let may_be_mains = |c: &Component| {
+        let mut grids = grids_with_a_line_at(c.frequency_hz, duration_s);
+        grids.next().is_some()
+    };
     let mut both = given.components.iter().zip(&found.components);
-    both.any(|(given, found)| is_sure(given) && !is_sure(found))
+    both.any(|(given, found)| is_sure(given) && !is_sure(found) && !may_be_mains(given))
 }
 
 /// Whether a component is significant.
 fn is_sure(component: &Component) -> bool {
     component.phasor.norm() > THERE * component.std_amplitude
+}
+
+/// By each significant order in each window: the angle of the shaft relative to its mean, and the variance of that.
+fn angles_by_order(
+    samples: &[f64],
+    rate_hz: f64,
+    fundamental: Fundamental,
+    whole: &Harmonics,
+    windows: usize,
+) -> Option<Vec<Vec<Option<[f64; 2]>>>> {
+    let orders: Vec<f64> = whole.components.iter().map(|c| c.order).collect();
+    let length = samples.len() / windows;
+    let shown = (0..windows).map(|window| {
+        let start = window * length;
+        let part = &samples[start..start + length];
+        let here = fit(part, rate_hz, start as f64 / rate_hz, fundamental, &orders).ok()?;
+        let pairs = whole.components.iter().zip(&here.components);
+        let by_order = pairs.map(|(mean, here)| {
+            let turned = (here.phasor * mean.phasor.conj()).arg();
+            let std_rad = here.std_amplitude / here.phasor.norm();
+            is_sure(here).then(|| [turned / here.order, (std_rad / here.order).powi(2)])
+        });
+        Some(by_order.collect())
+    });
+    shown.collect()
 }
 
 /// Mean of the variances of values.

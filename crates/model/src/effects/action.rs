@@ -13,7 +13,7 @@ pub type Frequency = Box<dyn Fn(&ModalResponse, f64) -> Complex64 + Send + Sync>
 
 /// A change of the dynamic stiffness of each mode: a function of the mode, the angular frequency in rad/s, and its
 /// `1 − (ω/ω₀)² + 2jζ ω/ω₀`.
-pub type Stiffness = Box<dyn Fn(&Mode, f64, Complex64) -> Complex64 + Send + Sync>;
+pub type StiffnessChange = Box<dyn Fn(&Mode, f64, Complex64) -> Complex64 + Send + Sync>;
 
 /// A known response that is not fitted, such as that of the recorder, as a function of frequency in
 /// Hz.
@@ -46,7 +46,7 @@ pub enum Action {
     /// A factor of the response.
     Factor(Frequency),
     /// A change of the stiffness, which also changes how the stand rings.
-    Stiffness(Stiffness),
+    Stiffness(StiffnessChange),
     /// A term of the response past the stand: the applied quantity couples directly into the
     /// record.
     Feedthrough(Frequency),

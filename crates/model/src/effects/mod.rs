@@ -44,7 +44,7 @@ mod time_delay;
 
 pub use crate::mode::Mode;
 pub use action::{
-    Action, Distortion, Fixed, Frequency, Memory, SampleClock, Stiffness, Torque, Treatment,
+    Action, Distortion, Fixed, Frequency, Memory, SampleClock, StiffnessChange, Torque, Treatment,
     Unrecovered,
 };
 pub(crate) use backlash::bridge;
