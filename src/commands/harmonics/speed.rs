@@ -114,18 +114,7 @@ pub(super) fn warning(
         let samples = record.samples.part(start..start + length).ok()?;
         let pairs = samples.iter().zip(&samples[lag..]);
         let changes: Vec<f64> = pairs.map(|(before, after)| after - before).collect();
-        // The range ends where the highest order exceeds the spectrum.
-        let from_hz = fundamental_hz.min(0.5 * record.rate_hz / highest / (1.0 + span));
-        let found = refine_fundamental(&changes, record.rate_hz, from_hz, span, orders).ok()?;
-        let at = |hz: f64| {
-            let fundamental = Fundamental::given(hz);
-            fit(&changes[..], record.rate_hz, 0.0, fundamental, orders).ok()
-        };
-        let both = at(fundamental_hz).zip(at(found.frequency_hz));
-        let duration_s = length as f64 / record.rate_hz;
-        let is_attracted =
-            both.is_some_and(|(given, found)| is_attracted(&given, &found, duration_s));
-        Some((found, is_attracted))
+        speed_in(&changes, record.rate_hz, (fundamental_hz, span), orders)
     };
     let with = |span, length| -> Option<Vec<(Fundamental, bool)>> {
         let parts = 0..PARTS;
@@ -163,6 +152,24 @@ pub(super) fn warning(
             ),
         )
     })
+}
+
+/// The fundamental within a relative range around the given one, and whether it is not that of the orders but attracted
+/// by another line.
+fn speed_in(
+    samples: &[f64],
+    rate_hz: f64,
+    (given_hz, span): (f64, f64),
+    orders: &[f64],
+) -> Option<(Fundamental, bool)> {
+    // The range ends where the highest order exceeds the spectrum.
+    let from_hz = given_hz.min(0.5 * rate_hz / highest(orders) / (1.0 + span));
+    let found = refine_fundamental(samples, rate_hz, from_hz, span, orders).ok()?;
+    let at = |hz: f64| fit(samples, rate_hz, 0.0, Fundamental::given(hz), orders).ok();
+    let both = at(given_hz).zip(at(found.frequency_hz));
+    let duration_s = samples.len() as f64 / rate_hz;
+    let is_attracted = both.is_some_and(|(given, found)| is_attracted(&given, &found, duration_s));
+    Some((found, is_attracted))
 }
 
 /// Maximum and minimum number of windows for the angle of the shaft.
