@@ -1,7 +1,7 @@
 //! Outputs are complete or absent.
 
 use std::io::Read;
-use std::process::Stdio;
+use std::process::{Child, ChildStdin, Stdio};
 
 use crate::noise::Noise;
 use crate::util::{Folder, command, record, sampled, signal, steady};
@@ -174,9 +174,30 @@ fn a_reader_that_goes_away_is_no_failure() {
 /// call has, they have none.
 const NAMED: [&str; 2] = ["unnamed * 95", "none * 95"];
 
+/// A run that has read the rows of the record and waits for more in its standard input.
+fn waiting(mut run: std::process::Command, folder: &Folder) -> (Child, ChildStdin) {
+    let child = run.stdin(Stdio::piped()).spawn();
+    let mut child = child.expect("the program starts");
+    let mut pipe = child.stdin.take().expect("a pipe");
+    std::io::Write::write_all(&mut pipe, folder.read("in.csv").as_bytes()).expect("rows");
+    (child, pipe)
+}
+
+/// A script in which `$0` is the binary.
+fn in_shell(script: &str, folder: &Folder) -> std::process::Command {
+    let mut shell = std::process::Command::new("sh");
+    shell
+        .args(["-c", script, env!("CARGO_BIN_EXE_torqcomp")])
+        .current_dir(folder.path(""));
+    shell
+}
+
+/// The compensation of standard input into a file.
+const OF_STDIN: [&str; 6] = ["compensate", "-", "--stand", "stand.toml", "-o", "out.csv"];
+
 /// Waits until a run has opened this many outputs, with or without a name.
 #[cfg(unix)]
-fn wait_for_outputs(folder: &Folder, child: &std::process::Child, count: usize) {
+fn wait_for_outputs(folder: &Folder, child: &Child, count: usize) {
     let named = || {
         let names = folder.names();
         names.iter().filter(|name| name.ends_with(".part")).count()
@@ -201,16 +222,9 @@ fn wait_for_outputs(folder: &Folder, child: &std::process::Child, count: usize) 
 #[test]
 fn an_interrupted_run_leaves_nothing() {
     let folder = folder();
-    let mut child = command(
-        &folder.path(""),
-        &["compensate", "-", "--stand", "stand.toml", "-o", "out.csv"],
-    )
-    .env("TORQCOMP_FAULT", NAMED[0])
-    .stdin(Stdio::piped())
-    .spawn()
-    .expect("the binary starts");
-    let mut pipe = child.stdin.take().expect("a pipe");
-    std::io::Write::write_all(&mut pipe, folder.read("in.csv").as_bytes()).expect("rows");
+    let mut run = command(&folder.path(""), &OF_STDIN);
+    run.env("TORQCOMP_FAULT", NAMED[0]);
+    let (mut child, pipe) = waiting(run, &folder);
     // It waits for more rows with its temporary file open.
     wait_for_outputs(&folder, &child, 1);
     signal("TERM", &child);
@@ -398,13 +412,9 @@ fn two_outputs_appear_both_or_neither() {
             "--force",
             "--json",
         ];
-        let mut child = command(&folder.path(""), &args)
-            .env("TORQCOMP_FAULT", named)
-            .stdin(Stdio::piped())
-            .spawn()
-            .expect("the binary starts");
-        let mut pipe = child.stdin.take().expect("a pipe");
-        std::io::Write::write_all(&mut pipe, folder.read("in.csv").as_bytes()).expect("rows");
+        let mut run = command(&folder.path(""), &args);
+        run.env("TORQCOMP_FAULT", named);
+        let (child, pipe) = waiting(run, &folder);
         wait_for_outputs(&folder, &child, 2);
         std::fs::create_dir(folder.path("out.svg")).unwrap();
         drop(pipe);
@@ -439,13 +449,7 @@ fn a_full_device_for_one_output_leaves_the_other_unwritten() {
 #[test]
 fn a_killed_run_leaves_nothing() {
     let folder = folder();
-    let args = ["compensate", "-", "--stand", "stand.toml", "-o", "out.csv"];
-    let mut child = command(&folder.path(""), &args)
-        .stdin(Stdio::piped())
-        .spawn()
-        .expect("the binary starts");
-    let mut pipe = child.stdin.take().expect("a pipe");
-    std::io::Write::write_all(&mut pipe, folder.read("in.csv").as_bytes()).expect("rows");
+    let (mut child, _pipe) = waiting(command(&folder.path(""), &OF_STDIN), &folder);
     wait_for_outputs(&folder, &child, 1);
     child.kill().unwrap();
     child.wait().unwrap();
@@ -460,11 +464,9 @@ fn a_run_without_memory_says_so_and_leaves_nothing() {
     let mut said = String::new();
     for limit_kib in (16_000..).step_by(1000) {
         let script = format!("ulimit -v {limit_kib}; exec \"$0\" \"$@\"");
-        let ran = std::process::Command::new("sh")
-            .args(["-c", &script, env!("CARGO_BIN_EXE_torqcomp")])
+        let ran = in_shell(&script, &folder)
             .args(COMPENSATE)
             .args(["--whole-record", "-o", "out.csv"])
-            .current_dir(folder.path(""))
             .output()
             .expect("the shell starts");
         if ran.status.success() {
@@ -483,11 +485,8 @@ fn a_closed_standard_output_is_a_failure() {
     let folder = folder();
     let run = |rest: &str| {
         let script = format!("exec \"$0\" compensate in.csv --stand stand.toml {rest}");
-        let ran = std::process::Command::new("sh")
-            .args(["-c", &script, env!("CARGO_BIN_EXE_torqcomp")])
-            .current_dir(folder.path(""))
-            .output()
-            .expect("the shell starts");
+        let ran = in_shell(&script, &folder).output();
+        let ran = ran.expect("the shell starts");
         (
             ran.status.code(),
             String::from_utf8_lossy(&ran.stderr).into_owned(),
@@ -509,16 +508,10 @@ fn a_closed_standard_output_is_a_failure() {
 #[test]
 fn what_a_killed_run_left_is_removed_by_the_next() {
     let folder = folder();
-    let args = ["compensate", "-", "--stand", "stand.toml", "-o", "out.csv"];
     let start = || {
-        let mut child = command(&folder.path(""), &args)
-            .env("TORQCOMP_FAULT", NAMED[0])
-            .stdin(Stdio::piped())
-            .spawn()
-            .expect("the binary starts");
-        let mut pipe = child.stdin.take().expect("a pipe");
-        std::io::Write::write_all(&mut pipe, folder.read("in.csv").as_bytes()).expect("rows");
-        (child, pipe)
+        let mut run = command(&folder.path(""), &OF_STDIN);
+        run.env("TORQCOMP_FAULT", NAMED[0]);
+        waiting(run, &folder)
     };
     let parts = || {
         folder
@@ -582,16 +575,10 @@ fn signals_leave_nothing_or_are_ignored() {
                 false => String::new(),
             };
             let script = format!("{trap}exec \"$0\" compensate - --stand stand.toml -o out.csv");
-            let mut child = std::process::Command::new("sh")
-                .args(["-c", &script, env!("CARGO_BIN_EXE_torqcomp")])
-                .current_dir(folder.path(""))
-                .env("TORQCOMP_FAULT", NAMED[usize::from(ignored)])
-                .stdin(Stdio::piped())
-                .stderr(Stdio::null())
-                .spawn()
-                .expect("the shell starts");
-            let mut pipe = child.stdin.take().expect("a pipe");
-            std::io::Write::write_all(&mut pipe, folder.read("in.csv").as_bytes()).expect("rows");
+            let mut run = in_shell(&script, &folder);
+            run.env("TORQCOMP_FAULT", NAMED[usize::from(ignored)])
+                .stderr(Stdio::null());
+            let (mut child, pipe) = waiting(run, &folder);
             wait_for_outputs(&folder, &child, 1);
             crate::util::signal(signal, &child);
             if !ignored {
