@@ -8,8 +8,6 @@ use torqcomp_dsp::store::SampleStore;
 
 use crate::recording::{Spool, UniformRecord};
 
-/// Standard deviation of a number rounded to whole steps, in steps: `1/√12`.
-const OF_A_STEP: f64 = 0.288_675_134_594_812_9;
 /// Uncertainty of an amplitude by its surroundings, relative to that of rounding spread like noise, below which the
 /// rounding is not in the surroundings.
 const MISSING: f64 = 0.5;
@@ -22,7 +20,8 @@ pub(super) fn add_rounding(fitted: &mut Harmonics, seen: &[f64], record: &Unifor
     let Some(found) = quantisation(seen) else {
         return;
     };
-    let std = OF_A_STEP * found.step;
+    // Of a number rounded to whole steps.
+    let std = found.step / 12.0_f64.sqrt();
     let count = record.samples.count() as f64;
     for component in &mut fitted.components {
         let spread = std * SQRT_2 / count.sqrt();

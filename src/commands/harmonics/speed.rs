@@ -123,12 +123,8 @@ pub(super) fn warning(
     // A speed that is not found may change so fast that a line exists over a few periods only.
     let few = (FEWEST * record.rate_hz / fundamental_hz) as usize;
     let found = with(SPAN, length).or_else(|| with(WIDE_SPAN, few))?;
-    if 2 * found
-        .iter()
-        .filter(|(_, is_attracted)| *is_attracted)
-        .count()
-        > PARTS
-    {
+    let attracted = found.iter().filter(|(_, is_attracted)| *is_attracted);
+    if 2 * attracted.count() > PARTS {
         return None;
     }
     let found: Vec<Fundamental> = found.into_iter().map(|(found, _)| found).collect();
