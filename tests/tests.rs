@@ -4,6 +4,7 @@ mod untrusted;
 mod util;
 
 mod agreement;
+mod applied_noise;
 mod bad_input;
 mod band;
 mod batch;

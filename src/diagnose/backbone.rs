@@ -234,6 +234,7 @@ mod tests {
             measured: Arc::new(measured.collect()),
             initial: InitialState::default(),
             is_held: false,
+            whitening: None,
         }
     }
 

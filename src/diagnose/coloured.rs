@@ -14,7 +14,7 @@ const WIDTH: f64 = 0.5;
 
 impl ScoredModel {
     /// Replaces the standard uncertainties by ones that allow for the colour of the training residuals, which noise on
-    /// the applied quantity acquires from the stand. Those for white noise remain where the derivatives are
+    /// the applied quantity acquires from the stand; `records` have the weights of the fit. Those for white noise remain where the derivatives are
     /// unavailable.
     pub fn with_coloured_std(mut self, records: &Records) -> Self {
         if let Some((free, covariance)) = coloured_covariance(&self, records) {
@@ -77,7 +77,15 @@ fn coloured_covariance(
             .zip(whole)
             .for_each(|(to, from)| *to = *from);
     }
-    let residuals: Vec<Vec<f64>> = model.train.iter().map(|r| r.samples.clone()).collect();
+    let is_weighted = training.iter().any(|record| record.whitening.is_some());
+    let residuals: Option<Vec<Vec<f64>>> = match is_weighted {
+        true => training
+            .iter()
+            .map(|r| Some(fitted.residual(r)?.samples))
+            .collect(),
+        false => Some(model.train.iter().map(|r| r.samples.clone()).collect()),
+    };
+    let residuals = residuals?;
     let all = 0..residuals.len();
     let mode = fitted.mode();
     let width_rad = WIDTH * mode.damping_ratio * mode.omega_rad_s / records.rate_hz();

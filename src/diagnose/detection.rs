@@ -4,9 +4,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use std::f64::consts::TAU;
 
+use super::SearchState;
 use super::blocks::compare;
 use super::record::StandRecord;
-use super::records::Records;
 use super::score::{BaseModel, EffectParameter, ScoredModel};
 use super::search::{evidence, listed};
 use super::starts::change;
@@ -53,11 +53,12 @@ const LARGEST_STEP: f64 = 30.0;
 const LINE: f64 = 0.5;
 
 /// The limits of all effects that are not part of a model.
-pub fn detection_limits(
-    model: &ScoredModel,
-    records: &Records,
-    threads: usize,
-) -> Vec<DetectionLimit> {
+pub fn detection_limits(found: &SearchState, threads: usize) -> Vec<DetectionLimit> {
+    let weighted = found.weighted.as_ref().and_then(|records| {
+        let model = ScoredModel::of(found.after.fitted.clone(), &records.training());
+        Some((model?, records))
+    });
+    let (model, records) = weighted.unwrap_or_else(|| (found.after.clone(), &found.records));
     let base = BaseModel::of(model.clone(), records);
     let training = model.fitted.with_initial_states(&records.train);
     let effects: Vec<_> = listed(&model.fitted.structure).collect();
@@ -177,6 +178,7 @@ impl Amount {
             let turn = TAU * frequency_hz / record.rate_hz();
             let line = record.range.clone().map(|i| turn * i as f64);
             let mut line: Vec<f64> = line.map(|phase| amplitude * phase.cos()).collect();
+            line = record.weighted(line);
             base.nuisance[k].clear(&mut line);
             line
         }))

@@ -374,9 +374,14 @@ impl FittedModel {
             }
             let excess = 1.0 - amplitude / own;
             let turning = phasors(TAU * frequency_hz / rate_hz, found.record.range.start);
-            for (sample, z) in found.samples.iter_mut().zip(turning) {
-                *sample += excess * (c * z.re + s * z.im);
-            }
+            let turning = turning.take(found.samples.len());
+            let line = turning.map(|z| excess * (c * z.re + s * z.im)).collect();
+            let line = found.record.weighted(line);
+            found
+                .samples
+                .iter_mut()
+                .zip(line)
+                .for_each(|(r, l)| *r += l);
         }
     }
 }
@@ -393,6 +398,7 @@ impl RecordResidual {
             measured: std::sync::Arc::new(measured.clone()),
             initial: InitialState::default(),
             is_held: false,
+            whitening: None,
         };
         Self {
             record,

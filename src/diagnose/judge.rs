@@ -33,6 +33,7 @@ impl SearchState {
         })?;
         self.judge_surface();
         self.declared = self.declared.as_ref().and_then(|m| self.held_out(m));
+        self.weigh_again(threads);
         self.judge_candidates(threads);
         self.suspected = self.suspected.take().and_then(|mut guard| {
             guard.model = self.held_out(&guard.model)?;
@@ -47,7 +48,12 @@ impl SearchState {
         });
         let finished = self.after.finished(&self.records, threads);
         let judged = match finished {
-            Some((last, fine)) => last.compared_on_holdout(&fine),
+            Some((last, fine)) => {
+                if self.weighted.is_some() {
+                    self.records = fine.clone();
+                }
+                last.compared_on_holdout(&fine)
+            }
             None => self.held_out(&self.after),
         };
         match judged {
@@ -61,8 +67,10 @@ impl SearchState {
         self.suspected = self.suspected.take().filter(is_borne_out);
         self.lower_noise_floor();
         self.confirm(threads);
+        self.drop_weights(threads);
+        let compared = self.weighted.as_ref().unwrap_or(&self.records);
         for model in [&mut self.before, &mut self.after] {
-            *model = model.clone().with_coloured_std(&self.records);
+            *model = model.clone().with_coloured_std(compared);
         }
         let without = std::mem::take(&mut self.without);
         self.ladder = Ladder::of(&self.after, &self.before, without, &self.records, threads);

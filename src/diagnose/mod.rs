@@ -59,6 +59,7 @@ mod test_noise;
 mod unexplained;
 mod units;
 mod verdict;
+mod whitening;
 
 use torqcomp_dsp::sort_by_number;
 use torqcomp_model::effects::{Fixed, RecordScales};
@@ -154,6 +155,8 @@ struct SearchState {
     settled: bool,
     /// Whether the held-out records confirm none of the effects found in the training records.
     is_refuted: bool,
+    /// The records with the weights with which models were compared, if there were any.
+    weighted: Option<Records>,
     /// Whether a shift of the channels explains the records better than the effects.
     is_outdone: bool,
 }
@@ -284,10 +287,13 @@ impl SearchState {
             tests,
             settled: true,
             is_refuted: false,
+            weighted: None,
             is_outdone: false,
         };
         let coarse = found.records.substeps();
+        found.weigh();
         found.build(coarse, workers);
+        found.drop_weights(workers.threads);
         found.lower_noise_floor();
         found.ask_surface(workers.threads);
         Ok(found)

@@ -97,16 +97,19 @@ impl NoiseFloor {
     /// the spectrum, where the plain stand predicts no signal. The noise on the applied quantity, filtered by the
     /// stand, is added to either: it is not in the records, but in the response of a model to the recorded input.
     pub fn of(residuals: &[RecordResidual], passage: &NoisePassage) -> Option<Self> {
-        let mode = &passage.first;
+        Some(Self::measured(residuals, &passage.first)?.with_applied(residuals, passage))
+    }
+
+    /// The noise of the measured quantity alone.
+    pub fn measured(residuals: &[RecordResidual], mode: &Mode) -> Option<Self> {
         let periods = residuals.iter().map(|r| {
             let record = &r.record;
             of_periods(record, record.measured_in_range(), mode)
         });
-        let measured = Self::pooled(periods, NoiseFloorSource::Periods).or_else(|| {
+        Self::pooled(periods, NoiseFloorSource::Periods).or_else(|| {
             let found = residuals.iter().filter_map(out_of_band);
             Self::pooled(found.map(Some), NoiseFloorSource::OutOfBand)
-        });
-        measured.map(|floor| floor.with_applied(residuals, passage))
+        })
     }
 
     /// Noise in the residuals of a model, from differences between periods: disturbances that are not periodic with the
@@ -118,11 +121,14 @@ impl NoiseFloor {
         Some(floor.with_applied(residuals, passage))
     }
 
-    /// Adds the noise on the applied quantity, filtered by the stand.
+    /// Adds the noise on the applied quantity, filtered by the stand, except where the residual is weighted for it.
     fn with_applied(self, residuals: &[RecordResidual], passage: &NoisePassage) -> Self {
         let passed = |residual: &RecordResidual| {
             let record = &residual.record;
-            let noise = noise_of_input(record.input.samples());
+            let noise = match record.whitening {
+                Some(_) => 0.0,
+                None => noise_of_input(record.input.samples()),
+            };
             let mean_square = noise * passage.passed(record.rate_hz());
             Some((mean_square, residual.samples.len()))
         };

@@ -10,6 +10,7 @@ use torqcomp_model::{Chain, Mode, StandRun};
 
 use super::columns::Columns;
 use super::records::EXCLUDED;
+use super::whitening::Whitening;
 
 /// State of the stand at the first sample of a record.
 #[derive(Debug, Clone, Copy, Default)]
@@ -45,6 +46,8 @@ pub struct StandRecord {
     /// Whether the applied quantity includes the measured one through a spring that ties a free
     /// body.
     pub is_held: bool,
+    /// The filter of its residual, if noise on the applied quantity is weighted.
+    pub whitening: Option<Whitening>,
 }
 
 /// Terms of a model whose phase or magnitude belongs to the record rather than the stand.
@@ -209,10 +212,26 @@ impl StandRecord {
         mode.damping_ratio * mode.omega_rad_s / self.rate_hz() * self.range.start as f64
     }
 
+    /// A residual, or a part of it, weighted for the noise on the applied quantity.
+    pub fn weighted(&self, mut samples: Vec<f64>) -> Vec<f64> {
+        if let Some(whitening) = &self.whitening {
+            whitening.apply(&mut samples);
+        }
+        samples
+    }
+
+    /// A weighted residual without its weights.
+    pub fn without_weights(&self, mut samples: Vec<f64>) -> Vec<f64> {
+        if let Some(whitening) = &self.whitening {
+            whitening.undo(&mut samples);
+        }
+        samples
+    }
+
     /// Motion of a mode over the range from a unit initial displacement, and from a unit initial speed over `ω₀`.
     fn free_motion(&self, mode: &Mode) -> [Vec<f64>; 2] {
         let free = Chain::new(*mode, 1.0).free_motion(self.rate_hz(), self.range.end);
-        free.map(|column| column[self.range.clone()].to_vec())
+        free.map(|column| self.weighted(column[self.range.clone()].to_vec()))
     }
 
     /// Nuisance terms of this record: a constant, the free motion of the plain stand after the record's start, and
@@ -225,7 +244,7 @@ impl StandRecord {
     ) -> Nuisance {
         let mut nuisance = Nuisance::default();
         let columns = &mut nuisance.columns;
-        columns.push(vec![1.0; self.count()]);
+        columns.push(self.weighted(vec![1.0; self.count()]));
         if self.has_free_motion(mode) {
             nuisance.motion = Some(1);
             nuisance.sees_start = self.sees_start(mode);
@@ -245,7 +264,9 @@ impl StandRecord {
     /// Nuisance terms of this record except the motion: a constant and the given terms.
     pub fn nuisance_beside_motion(&self, terms: &NuisanceTerms) -> Nuisance {
         let mut nuisance = Nuisance::default();
-        nuisance.columns.push(vec![1.0; self.count()]);
+        nuisance
+            .columns
+            .push(self.weighted(vec![1.0; self.count()]));
         self.with_lasting_terms(&mut nuisance, terms);
         self.with_moved_terms(nuisance, terms)
     }
@@ -257,7 +278,7 @@ impl StandRecord {
         for wave in 1..=terms.drift_half_waves {
             let turn = PI * wave as f64 / count as f64;
             let cosine = |i| (turn * (i as f64 + 0.5)).cos();
-            columns.push((0..count).map(cosine).collect());
+            columns.push(self.weighted((0..count).map(cosine).collect()));
         }
         for mode in terms.modes.iter().filter(|m| self.has_free_motion(m)) {
             nuisance.modes.push((columns.count(), mode.omega_rad_s));
@@ -274,14 +295,15 @@ impl StandRecord {
         let (rate_hz, count) = (self.rate_hz(), self.count());
         for rate_per_s in &terms.decays_per_s {
             let step = rate_per_s / rate_hz;
-            columns.push((0..count).map(|i| (-step * i as f64).exp()).collect());
+            let decay = (0..count).map(|i| (-step * i as f64).exp());
+            columns.push(self.weighted(decay.collect()));
         }
         nuisance.lines = columns.count();
         for frequency_hz in &terms.lines_hz {
             let turning = phasors(TAU * frequency_hz / rate_hz, self.range.start);
             let (cosine, sine) = turning.take(count).map(|z| (z.re, z.im)).unzip();
-            columns.push(cosine);
-            columns.push(sine);
+            columns.push(self.weighted(cosine));
+            columns.push(self.weighted(sine));
         }
         nuisance
     }

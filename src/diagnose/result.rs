@@ -159,7 +159,7 @@ impl Diagnosis {
         let declared = case.declared_effects.iter();
         let declared_effects = declared.map(|e| e.effect.effect.name).collect();
         let detection_limits = match verdict {
-            Verdict::NothingMissing => detection_limits(&found.after, &found.records, threads),
+            Verdict::NothingMissing => detection_limits(&found, threads),
             _ => Vec::new(),
         };
         let is_open = matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained);

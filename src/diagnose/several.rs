@@ -67,6 +67,7 @@ impl SearchState {
         }
         if let Some(way) = best {
             self.arrive(way);
+            self.weigh();
         }
         // Once an effect that only resembled another is gone, what it hid may appear, and be exchanged
         // in turn.

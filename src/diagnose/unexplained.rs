@@ -151,7 +151,7 @@ pub fn raw_residuals(runs: &[StandRun], record: &StandRecord) -> Vec<Result<Vec<
         let pairs = pairs.zip(&modelled[record.range.clone()]);
         let residual: Vec<f64> = pairs.map(|(y, x)| y - x).collect();
         match residual.last().is_some_and(|r| r.is_finite()) {
-            true => Ok(residual),
+            true => Ok(record.weighted(residual)),
             false => Err(FitError::Model("the motion diverges".to_owned())),
         }
     };

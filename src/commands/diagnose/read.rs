@@ -427,6 +427,7 @@ fn record(
         },
         initial: InitialState::default(),
         is_held: false,
+        whitening: None,
     })
 }
 
