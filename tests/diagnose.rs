@@ -108,7 +108,7 @@ fn page_is_complete(page: &str) {
         "holdout.csv",
         "Autocorrelation",
         "Spectrum",
-        "Over displacement",
+        "Residual over displacement",
         "Candidates",
         "coulomb-friction",
         "n = c x^3; the gage shows x. The stiffness changes with the square",

@@ -35,7 +35,11 @@ pub fn residual(
     let mut parts = Vec::new();
     if let Some(floor) = found.noise_floor {
         let ratio = found.after.compared_rms() / floor.rms;
-        parts.push(format!("{} times the noise floor", rounded(ratio, 3)));
+        let ratio = match ratio < 10.0 {
+            true => format!("{ratio:.2}"),
+            false => rounded(ratio, 3),
+        };
+        parts.push(format!("{ratio} times the noise floor"));
     }
     parts.push(if tests.white { "white" } else { "not white" }.to_owned());
     if found.is_coloured_noise(&found.after, tests) && !tests.white {
@@ -53,7 +57,7 @@ pub fn residual(
         let is_hidden = |source| source == NoiseFloorSource::Periods;
         let is_hidden = found.noise_floor.is_some_and(|f| is_hidden(f.from));
         parts.push(format!(
-            "{:.0} % of its power follows {}{}",
+            "{:.0} % of its power is explained by {}{}",
             100.0 * share.share.min(1.0),
             share.of,
             match is_hidden {
@@ -107,7 +111,7 @@ fn moving_line(tests: &ResidualTests) -> Option<String> {
 fn dependence(tests: &ResidualTests) -> Option<String> {
     match tests.dependence() {
         Some(share) => Some(format!(
-            "{:.0} % of its power follows from {}",
+            "{:.0} % of its power is explained by {}",
             100.0 * share.share,
             share.of
         )),

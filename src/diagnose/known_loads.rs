@@ -35,7 +35,7 @@ const GAINS_DIFFER: (f64, f64) = (3.0, 1e-3);
 pub struct LoadCheck {
     /// The static gain by the loads, with the effects that were found.
     pub gain: f64,
-    /// Its standard uncertainty.
+    /// Standard uncertainty of `gain`.
     pub gain_std: Option<f64>,
     /// Unit of the gain.
     pub gain_unit: String,

@@ -45,7 +45,7 @@ pub struct ChangedStand {
     pub constants: Vec<ChangedConstant>,
     /// Rms error of one stand over the record, fitted to it alone.
     pub one_stand_rms: f64,
-    /// That of the two stands.
+    /// Rms error of two stands, one before and one after the change.
     pub two_stands_rms: f64,
     /// Unit of both errors.
     pub unit: String,
@@ -60,11 +60,11 @@ pub struct ChangedConstant {
     pub unit: String,
     /// Value before the moment.
     pub before: f64,
-    /// Its standard uncertainty; `null` if unknown.
+    /// Standard uncertainty of `before`; `null` if unknown.
     pub before_std: Option<f64>,
     /// Value after the moment.
     pub after: f64,
-    /// Its standard uncertainty; `null` if unknown.
+    /// Standard uncertainty of `after`; `null` if unknown.
     pub after_std: Option<f64>,
 }
 

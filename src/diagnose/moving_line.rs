@@ -25,9 +25,9 @@ const JUMP: f64 = 2.0;
 /// A line that moves.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct MovingLine {
-    /// Its frequency at the beginning, in Hz.
+    /// Frequency at the beginning, in Hz.
     pub from_hz: f64,
-    /// Its frequency at the end, in Hz.
+    /// Frequency at the end, in Hz.
     pub to_hz: f64,
     /// Share of the residual's power that it has in a typical segment of the record.
     pub share: f64,

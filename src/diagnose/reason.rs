@@ -169,7 +169,7 @@ impl Reason {
                 "improves the fit, but explains only {:.0} % of the error above the noise: the main cause is something else",
                 100.0 * explained.max(0.0)
             ),
-            Self::NotConfirmed { change } => not_confirmed(&percent(*change)),
+            Self::NotConfirmed { change } => not_confirmed(*change),
             Self::Diverges => "its motion diverges on the hold-out records".to_owned(),
             Self::NoneAccepted => "no effect is accepted".to_owned(),
         }
@@ -192,10 +192,16 @@ fn small_share(percent: f64) -> String {
 }
 
 /// An effect not confirmed by the held-out records.
-fn not_confirmed(change: &str) -> String {
-    format!(
-        "reduces the training error, but the hold-out error changes by only {change}: not confirmed"
-    )
+fn not_confirmed(change: f64) -> String {
+    let size = percent(change);
+    let of_holdout = match change > 0.0 {
+        true => format!(
+            "increases the hold-out error by {}",
+            size.trim_start_matches('+')
+        ),
+        false => format!("the hold-out error changes by only {size}"),
+    };
+    format!("reduces the training error, but {of_holdout}: not confirmed")
 }
 
 /// A further effect that explains too little, with the minimum shares in percent.

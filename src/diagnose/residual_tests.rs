@@ -32,7 +32,7 @@ const FOLLOWING: f64 = 0.08;
 /// Standard deviations from zero required for that.
 const NONSTATIONARY: f64 = 6.0;
 
-/// A share of the residual's power that follows from something.
+/// A share of the residual's power that a quantity explains.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct PowerShare {
     /// Quantity that the share depends on.

@@ -46,7 +46,7 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// Names of the effects that were added.
     pub effects: Vec<&'static str>,
-    /// Names of those that the stand file declares; they are refitted in all models except the declared one.
+    /// Names of the effects declared in the stand file; they are refitted in all models except the declared one.
     pub declared_effects: Vec<&'static str>,
     /// `band-limited`, `straight-lines` or `held`.
     pub input_between_samples: &'static str,

@@ -44,9 +44,10 @@ pub struct RunningCheck {
     pub range_hz: Option<[f64; 2]>,
     /// Why the record does not show the resonance; `null` if it does.
     pub hidden: Option<String>,
-    /// The plain stand compared with the stand in use; `null` if the record does not show that.
+    /// The plain stand compared with the stand in use; `null` if the record does not show the resonance.
     pub before: Option<ModeDifference>,
-    /// The stand with the accepted effects, at small motions, compared with the stand in use; `null` as before.
+    /// The stand with the accepted effects, at small motions, compared with the stand in use; `null` if the record does
+    /// not show the resonance.
     pub after: Option<ModeDifference>,
     /// The 12 strongest lines of a steady speed.
     pub lines: Vec<RunningLine>,
@@ -174,11 +175,11 @@ impl Diagnosis {
             Warning::new(
                 "running-differs",
                 format!(
-                    "{}: in use, the stand has a natural frequency of {} Hz and a damping ratio of {}; the stand found has {} \
-                     Hz and {}. A torque compensated with the stand found is off by up to {} near the resonance. Either \
-                     the clamping, the temperature, the parts mounted or the size of the motion differ: fit records \
-                     taken under the conditions of use. Or an order or another peak of the torque lies there: compare \
-                     with a record at another speed",
+                    "{}: in use, the stand has a natural frequency of {} Hz and a damping ratio of {}; the fitted \
+                     stand has {} Hz and {}. A torque compensated with the fitted stand is off by up to {} near the \
+                     resonance. Possible causes: clamping, temperature, mounted parts or size of the motion differ \
+                     (fit records taken under the conditions of use), or an order or another peak of the torque lies \
+                     there (compare with a record at another speed)",
                     record.source,
                     shown(&found.natural_frequency),
                     shown(&found.damping_ratio),

@@ -56,15 +56,15 @@ pub fn running_sentences(diagnosis: &Diagnosis) -> Vec<String> {
     let mut all: Vec<String> = diagnosis.running.iter().map(of_record).collect();
     if !all.is_empty() {
         all.push(
-            "A running record does not show how large the torque is, so neither the gain nor what depends on the size of \
-             the motion follows from it."
+            "A record of the running machine does not show the size of the torque, so it gives neither the gain nor \
+             effects that depend on amplitude."
                 .to_owned(),
         );
     }
     all
 }
 
-/// The resonance that a running record shows beside that of the stand found.
+/// The resonance that a running record shows beside that of the fitted stand.
 fn in_use(check: &RunningCheck, diagnosis: &Diagnosis) -> String {
     if let Some(hidden) = &check.hidden {
         return format!("the resonance is not visible: {hidden}.");
@@ -78,7 +78,7 @@ fn in_use(check: &RunningCheck, diagnosis: &Diagnosis) -> String {
         false => ", with effects that may change both with the size of the motion",
     };
     format!(
-        "in use, the natural frequency is {frequency} Hz and the damping ratio {ratio}; the stand found has {} Hz and \
+        "in use, the natural frequency is {frequency} Hz and the damping ratio {ratio}; the fitted stand has {} Hz and \
          {}{at_small}.",
         shown(&of_stand),
         shown(&ratio_of_stand)

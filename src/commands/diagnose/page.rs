@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::checks::{load_sentences, running_sentences};
 use super::text::{
-    WOULD_SHOW, answer, candidates, cells, constant_rows, error_rows, error_sentences, ladder_rows,
-    limit_rows, share_rows,
+    SHARES_OVERLAP, WOULD_SHOW, answer, candidates, cells, constant_rows, error_rows,
+    error_sentences, ladder_rows, limit_rows, share_rows,
 };
 use crate::chart::{Chart, Page, Series};
 use crate::diagnose::{
@@ -84,6 +84,7 @@ impl Draft<'_> {
         if self.diagnosis.effects.len() > 1 {
             self.page.table(&ladder_rows(self.diagnosis));
             self.page.table(&share_rows(self.diagnosis));
+            self.page.text(SHARES_OVERLAP);
         }
     }
 
@@ -114,7 +115,7 @@ impl Draft<'_> {
         };
         let before = &self.diagnosis.before;
         rows.extend(before.train.iter().map(|r| row(r, "training")));
-        rows.extend(before.compared.iter().map(|r| row(r, "held out")));
+        rows.extend(before.compared.iter().map(|r| row(r, "hold-out")));
         self.page.table(&rows);
     }
 
@@ -139,7 +140,7 @@ impl Draft<'_> {
     }
 
     fn models_over_time(&mut self) {
-        self.page.heading("Measured and modelled, held out");
+        self.page.heading("Measured and modelled, hold-out records");
         let before = &self.diagnosis.before.compared;
         let worst = (0..before.len()).max_by(|a, b| before[*a].rms().total_cmp(&before[*b].rms()));
         let Some((k, worst)) = worst.map(|k| (k, &before[k])) else {
@@ -184,7 +185,7 @@ impl Draft<'_> {
     }
 
     fn residuals(&mut self) {
-        self.page.heading("Residual, held out");
+        self.page.heading("Residual, hold-out records");
         for (k, first) in self.diagnosis.before.compared.iter().enumerate() {
             let times_s = first.times_s();
             let chart = self.of_residuals(
@@ -245,7 +246,7 @@ impl Draft<'_> {
     }
 
     fn autocorrelation(&self) -> Chart {
-        let title = "Autocorrelation; within the band: white at 99 %";
+        let title = "Autocorrelation (shaded: 99 % limits for white noise)";
         let labels = ["lag, samples", "autocorrelation, no unit"];
         let (shares, bound) = autocorrelation(&self.diagnosis.before.compared, LAGS);
         let lags: Vec<f64> = (0..shares.len()).map(|lag| lag as f64).collect();
@@ -268,7 +269,9 @@ impl Draft<'_> {
             }
             bins
         };
-        let title = format!("Over {name}: mean in each bin; band: before ± two standard errors");
+        let title = format!(
+            "Residual over {name}, averaged in bins (shaded: before, ± two standard errors)"
+        );
         let x_label = format!("modelled {name}, {}{per}", self.unit);
         let band = bins(&self.diagnosis.before.compared).into_iter();
         let band = band.map(|b| (b.motion, b.mean - 2.0 * b.std, b.mean + 2.0 * b.std));
@@ -321,7 +324,7 @@ impl Draft<'_> {
             value.map_or_else(|| "–".to_owned(), |v| rounded(v, digits))
         };
         let [held_out, training] =
-            ["held out", "training"].map(|part| format!("{part}, {}", self.unit));
+            ["hold-out", "training"].map(|part| format!("{part}, {}", self.unit));
         let mut rows = vec![cells([
             "effect", "status", &held_out, &training, "p", "reason",
         ])];
@@ -344,7 +347,7 @@ impl Draft<'_> {
         self.page
             .text(&format!("Hold-out residual: {}.", residual.described));
         let mut rows = vec![cells([
-            "follows from",
+            "explained by",
             "share of its power",
             "significance (standard deviations)",
         ])];
@@ -362,7 +365,7 @@ impl Draft<'_> {
         }));
         self.page.table(&rows);
         if !self.diagnosis.detection_limits.is_empty() {
-            self.page.text(&format!("{WOULD_SHOW}:"));
+            self.page.text(WOULD_SHOW);
             self.page.table(&limit_rows(self.diagnosis));
         }
     }
@@ -377,13 +380,13 @@ impl Draft<'_> {
         self.page
             .heading("The missing torque, without an assumed law");
         let shares = &surface.shares;
-        let mut rows = vec![cells(["it follows from", "share"])];
+        let mut rows = vec![cells(["explained by", "share"])];
         rows.extend(
             [
                 ("the displacement", shares.displacement),
                 ("the speed", shares.speed),
                 ("both together", shares.both),
-                ("the path to it", shares.history),
+                ("the history of the motion", shares.history),
             ]
             .map(|(of, share)| cells([of, &format!("{} %", rounded(100.0 * share, 2))])),
         );
@@ -396,7 +399,7 @@ impl Draft<'_> {
             let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p.at, p.torque)).unzip();
             let chart = Chart::new(
                 &format!(
-                    "Over {name}, without its straight line; band: two standard uncertainties"
+                    "Torque over {name}, without its straight line (shaded: ± two standard uncertainties)"
                 ),
                 &format!("{name}, {}{per}", self.unit),
                 &self.label("torque"),

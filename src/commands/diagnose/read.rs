@@ -284,8 +284,8 @@ fn check_same_kind(first: &Pair, other: &Pair) -> Result<(), Failure> {
         return Err(Failure::failed(
             ErrorCode::RecordsDiffer,
             format_args!(
-                "{} has {} Hz, {} has {} Hz: all records of a diagnosis must have the same sampling rate; resample \
-                 one of them",
+                "{} is sampled at {} Hz, {} at {} Hz: all records of a diagnosis must have the same sampling rate; \
+                 resample one of them",
                 first.source,
                 short(first.rate_hz),
                 other.source,

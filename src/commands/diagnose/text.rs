@@ -52,7 +52,7 @@ impl Report for Diagnosis {
         }
         text += &format!("\nresidual: {}\n", self.residual.described);
         if !self.detection_limits.is_empty() {
-            text += &format!("\n{WOULD_SHOW}:\n\n");
+            text += &format!("\n{WOULD_SHOW}\n\n");
             for row in &limit_rows(self)[1..] {
                 let at = match row[2].as_str() {
                     "" => String::new(),
@@ -168,8 +168,8 @@ fn of_surface(surface: &ForceSurface, unit: &str) -> Vec<String> {
     };
     vec![
         format!(
-            "Without an assumed law: {place} over displacement and speed, accepted effects included, leaves {} {} of \
-             the hold-out records, given the motion measured there.{named}",
+            "Without an assumed law: {place} as a function of displacement and speed, including the accepted effects, \
+             leaves an rms residual of {} {} on the hold-out records (computed along their measured motion).{named}",
             rounded(surface.holdout_rms, 4),
             unit_or_as_recorded(unit)
         ),
@@ -221,6 +221,8 @@ fn several(diagnosis: &Diagnosis) -> String {
         return String::new();
     }
     let mut text = columns(&ladder_rows(diagnosis)) + "\n" + &columns(&share_rows(diagnosis));
+    text += SHARES_OVERLAP;
+    text.push('\n');
     for pair in &diagnosis.explained.correlations {
         let [one, other] = pair.effects;
         text += &format!(
@@ -234,7 +236,7 @@ fn several(diagnosis: &Diagnosis) -> String {
 /// The hold-out error with an increasing number of effects, with a heading.
 pub fn ladder_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     let head = format!("rms error, {}", unit_or_as_recorded(&diagnosis.error.unit));
-    let mut rows = vec![cells([&head, "training", "held out"])];
+    let mut rows = vec![cells([&head, "training", "hold-out"])];
     rows.extend(diagnosis.explained.ladder.iter().map(|step| {
         let effects = match step.effects.as_slice() {
             [] => "with none".to_owned(),
@@ -246,9 +248,13 @@ pub fn ladder_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     rows
 }
 
+/// Explanation of the contributions of several effects.
+pub const SHARES_OVERLAP: &str =
+    "These can add up to more or less than 100 %, as effects explain parts of the same error.";
+
 /// The contribution of each effect, with a heading.
 pub fn share_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
-    let mut rows = vec![cells(["effect", "share of the explained power"])];
+    let mut rows = vec![cells(["effect", "explained power lost without it"])];
     let shares = diagnosis.explained.shares.iter();
     rows.extend(shares.map(|s| {
         let share = format!("{} %", rounded(100.0 * s.share, 2));
@@ -269,7 +275,7 @@ pub fn estimate(value: f64, std: Option<f64>) -> String {
 pub fn error_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     let error = &diagnosis.error;
     let head = format!("rms error, {}", unit_or_as_recorded(&error.unit));
-    let mut rows = vec![cells([&head, "training", "held out", "relative"])];
+    let mut rows = vec![cells([&head, "training", "hold-out", "relative"])];
     let declared = error.declared.iter();
     let declared = declared.map(|errors| ("declared: the stand file as it is", errors));
     let fitted = [
@@ -330,12 +336,12 @@ pub fn error_sentences(diagnosis: &Diagnosis) -> Vec<String> {
 }
 
 /// Explanation of the detection limits.
-pub const WOULD_SHOW: &str =
-    "Smallest amounts detectable in the training records with 95 % certainty";
+pub const WOULD_SHOW: &str = "Detection limits: an effect at or beyond these values would have been detected in the \
+    training records (95 % certainty).";
 
 /// The detection limits, with a heading.
 pub fn limit_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
-    let mut rows = vec![cells(["effect", "detectable from", "at"])];
+    let mut rows = vec![cells(["effect", "detectable at", "other parameters"])];
     rows.extend(diagnosis.detection_limits.iter().map(|limit| {
         let side = match limit.shows {
             ShownSide::From => ">=",
@@ -389,12 +395,11 @@ pub fn cells<const N: usize>(texts: [&str; N]) -> Vec<String> {
 }
 
 fn candidate(candidate: &CandidateFit) -> String {
+    let error = candidate.holdout_rms.map(|v| rounded(v, 4));
+    let error = error.map_or_else(String::new, |v| format!(", hold-out error {v}"));
     let mut text = format!(
-        "{}: {}, {}: {}\n",
+        "{}{error}: {}; {}\n",
         candidate.names().join(" + "),
-        candidate
-            .holdout_rms
-            .map_or_else(|| "-".to_owned(), |v| rounded(v, 4)),
         candidate.status().name(),
         candidate.reason.text()
     );

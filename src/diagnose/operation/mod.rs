@@ -110,7 +110,7 @@ impl Hidden {
     /// The reason in words, with a remedy.
     pub fn text(self) -> String {
         match self {
-            Self::None => "the stand found has no resonance".to_owned(),
+            Self::None => "the fitted stand has no resonance".to_owned(),
             Self::TooShort { least_s } => format!(
                 "the record is too short to resolve it; record at least {} s",
                 rounded(ROUNDED_UP * least_s, 2)

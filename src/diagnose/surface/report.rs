@@ -18,7 +18,7 @@ const SPOKEN_OF: f64 = 0.1;
 /// memory.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ForceSurface {
-    /// Its location.
+    /// Where the torque acts.
     pub place: SurfacePlace,
     /// Whether no law is named because this explains far more than the best of them.
     pub outdoes_laws: bool,
