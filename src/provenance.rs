@@ -85,7 +85,7 @@ fn date() -> Result<String, Failure> {
     let seconds = seconds.ok_or_else(|| {
         Failure::usage(
             ErrorCode::InvalidValue,
-            "the environment variable SOURCE_DATE_EPOCH is no time; expected whole seconds since 1970",
+            "the environment variable SOURCE_DATE_EPOCH is not a time; expected whole seconds since 1970",
         )
     })?;
     Ok(format!("{}Z", utc(seconds)))

@@ -83,6 +83,7 @@ const REASONS: [(&str, &[&str]); 5] = [
         "no recording",
         &[
             "no table of numbers",
+            "not a table of numbers",
             "file is empty",
             "not a recording",
             "no column besides the time",

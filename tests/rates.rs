@@ -25,7 +25,7 @@ fn stamps_in_whole_seconds_do_not_give_a_rate_for_a_resonance() {
     let folder = Folder::new();
     let clock = |i: usize| format!("10:00:0{}", i / 1000);
     folder.write("in.csv", record(clock, 0..2000).replace("Time [s]", "Time"));
-    let asks = ["rounded to 1 s", "any rate from", "Hz on", "--rate HZ"];
+    let asks = ["rounded to 1 s", "any rate of", "Hz or more", "--rate HZ"];
     compensate(&folder, &[]).says(1, &asks);
     let response = ["--stand", "stand.toml"];
     let runs: [&[&str]; 3] = [
@@ -55,7 +55,7 @@ fn stamps_in_whole_seconds_do_not_give_a_rate_for_a_resonance() {
     );
     let inspected = folder.run(&["inspect", "in.csv"]);
     assert!(
-        inspected.code == 0 && inspected.stdout.contains("any rate from"),
+        inspected.code == 0 && inspected.stdout.contains("any rate of"),
         "{}",
         inspected.stdout
     );

@@ -49,7 +49,7 @@ pub struct Reading {
     /// Topic of an MCAP file (/joint_states); its fields are the channels
     #[arg(long, value_name = "TOPIC")]
     pub topic: Option<String>,
-    /// Time of messages to use [default: their own stamp if they have one, else log]
+    /// Clock for message times: header (their own stamp), log or publish [default: header if there is one, else log]
     #[arg(long, value_name = "CLOCK", value_parser = clock)]
     pub time: Option<TimeChoice>,
     /// Field with the sample spacing, for messages with many samples

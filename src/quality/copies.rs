@@ -71,7 +71,7 @@ impl Family<'_> {
                 format!("\"{}\" = {right}", seen.label)
             });
             let message = format!(
-                "{}, within its resolution: the same signal in different scales",
+                "to within the rounding of both, {}: the same signal on different scales",
                 equations.collect::<Vec<_>>().join("; ")
             );
             found.push((Warning::new("channel-multiple", message), names(&scaled)));

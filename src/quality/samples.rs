@@ -225,12 +225,12 @@ fn stuck(name: &str, unit: &str, found: &Standstills, axis: &TimeAxis) -> Warnin
     Warning::new(
         "stuck-channel",
         format!(
-            "\"{name}\" is constant in {}, {samples} samples in all; the longest is at {} from {} on, {} samples: at \
-             rest, or a drop-out of a cable, a transmitter or the recorder",
+            "\"{name}\" is constant in {}, {samples} samples in all; the longest is {} samples at {}, starting at {}: \
+             at rest, or a drop-out of a cable, a transmitter or the recorder",
             plural(found.count, "stretch"),
+            longest.length,
             with_unit(longest.value, unit, 6),
-            place(axis, longest.start),
-            longest.length
+            place(axis, longest.start)
         ),
     )
 }

@@ -288,7 +288,7 @@ fn check_finite(selection: &Selection) -> Result<(), Failure> {
         Some(place) => Err(Failure::failed(
             ErrorCode::InvalidSample,
             format_args!(
-                "sample {} of \"{}\" is no finite number; repair it or cut the record there",
+                "sample {} of \"{}\" is not a finite number; repair it or cut the record there",
                 place + 1,
                 channel.name
             ),
@@ -344,7 +344,7 @@ fn names(chosen: &[Selection]) -> String {
 fn differ(chosen: &[Selection]) -> Failure {
     let one = |c: &Selection| {
         format!(
-            "\"{}\" has {} Hz from {} on",
+            "\"{}\" is sampled at {} Hz, starting at {}",
             c.channel.name,
             print::short(c.rate_hz),
             c.start.short()

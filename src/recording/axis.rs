@@ -111,7 +111,7 @@ impl RateFrom {
         match self {
             Self::None => "unknown".to_owned(),
             Self::Given => "given with --rate".to_owned(),
-            Self::Header(words) => format!("from the head of the file: {words}"),
+            Self::Header(words) => format!("from the header of the file: {words}"),
             Self::Stamps(heading) if resampled => {
                 format!("from the stamps in \"{heading}\", interpolated")
             }

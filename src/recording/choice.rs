@@ -11,7 +11,7 @@ use super::text::CELLS_WITH_UNITS;
 use super::{Channel, Hole, HoleKind, RateFrom, Recording, check_holes, check_size, formats};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading, digits};
-use crate::print::{list, plural};
+use crate::print::{enumeration, list, plural};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
@@ -66,7 +66,7 @@ pub(crate) fn choose(
                     format_args!(
                         "{} channels could be the signal; choose one with {flag} {}",
                         several.len(),
-                        names(channels)
+                        names(channels, "or")
                     ),
                 )
             })),
@@ -84,12 +84,16 @@ pub(crate) fn choose(
         return Ok(place);
     }
     let known = channels.iter().map(|c| c.name);
+    let there_are = match channels {
+        [_] => "the only channel is",
+        _ => "the channels are",
+    };
     Err(Failure::failed(
         ErrorCode::ChannelNotFound,
         format_args!(
-            "there is no channel \"{wanted}\"{}; the channels are {}",
+            "there is no channel \"{wanted}\"{}; {there_are} {}",
             did_you_mean(wanted, known),
-            names(channels)
+            names(channels, "and")
         ),
     ))
 }
@@ -139,18 +143,19 @@ pub(super) fn by_part(channels: &[Label], wanted: &str) -> Result<Option<usize>,
                 named(
                     several
                         .iter()
-                        .map(|place| format!("\"{}\"", channels[*place].name))
+                        .map(|place| format!("\"{}\"", channels[*place].name)),
+                    "and"
                 )
             ),
         )),
     }
 }
 
-/// The first of many names, and the number of further ones.
-fn named(names: impl ExactSizeIterator<Item = String>) -> String {
+/// The names, with a word before the last one; of many, the first and the number of further ones.
+fn named(names: impl ExactSizeIterator<Item = String>, word: &str) -> String {
     let more = names.len().saturating_sub(NAMED);
     match more {
-        0 => list(names),
+        0 => enumeration(&names.collect::<Vec<_>>(), word),
         _ => {
             let first: Vec<String> = names.take(NAMED).collect();
             format!("{} and {more} more", first.join(", "))
@@ -159,7 +164,7 @@ fn named(names: impl ExactSizeIterator<Item = String>) -> String {
 }
 
 /// The channels as they can be selected: by name, or by number if a name is used twice.
-fn names(channels: &[Label]) -> String {
+fn names(channels: &[Label], word: &str) -> String {
     let one = |(place, channel): (usize, &Label)| {
         let same = channels.iter().filter(|c| c.name == channel.name);
         match (same.count(), channel.segment) {
@@ -175,7 +180,7 @@ fn names(channels: &[Label]) -> String {
             }
         }
     };
-    named(channels.iter().enumerate().map(one))
+    named(channels.iter().enumerate().map(one), word)
 }
 
 /// Unit of a channel: the given one, or that of the file; with a warning if both differ.

@@ -141,7 +141,7 @@ fn refuse_holes(channel: &Channel, by_stamps: bool, remedy: &str) -> Result<(), 
         HoleKind::InstrumentsMark => {
             "is 9.91e37 or \u{b1}9.9e37, which instruments write for no value or over range"
         }
-        HoleKind::Text => "is a text, expected a number",
+        HoleKind::Text => "is text, expected a number",
     };
     let refused = Failure::failed(
         ErrorCode::InvalidSample,

@@ -99,7 +99,7 @@ pub struct Segment {
     pub name: String,
     /// Start after the first segment, in s; `null` if the file does not say.
     pub start_s: Option<f64>,
-    /// Its date and time: in ISO 8601 where unambiguous, otherwise as written.
+    /// Date and time of the start: in ISO 8601 where unambiguous, otherwise as written.
     #[serde(rename = "start_time")]
     pub start_text: Option<String>,
 }
@@ -264,7 +264,7 @@ fn refuse_for_tables(reading: &Reading) -> Result<(), Failure> {
     let given = [("--full-scale", reading.full_scale.is_some())];
     refuse(
         &given,
-        "the input is a text, whose numbers are values; give their unit with --unit",
+        "the input is a text file, whose numbers are already in physical units; give their unit with --unit",
     )
 }
 
@@ -280,7 +280,7 @@ pub(crate) fn refuse_for_text(choice: &ChannelChoice, reading: &Reading) -> Resu
     let flag = choice.flags.channel;
     refuse(
         &given,
-        &format!("the input is no MCAP file; choose with {flag} NAME"),
+        &format!("the input is not an MCAP file; choose with {flag} NAME"),
     )
 }
 

@@ -97,9 +97,9 @@ impl Moment {
 struct StartMoment {
     /// Time of the first sample on the time axis of the record, in s.
     start_s: f64,
-    /// The same in ns, if the clock does not start with the record.
+    /// Time of the first sample in ns, `null` if the clock starts with the record.
     start_ns: Option<i64>,
-    /// Its date and time in UTC, if the clock counts from 1970.
+    /// Date and time of the first sample in UTC, `null` if the clock does not count from 1970.
     start_time: Option<String>,
 }
 

@@ -26,8 +26,8 @@ impl TimeBound {
             Failure::usage(
                 ErrorCode::InvalidValue,
                 format_args!(
-                    "--range: \"{text}\" is no time; expected seconds, as 0.5, a time of day, as 14:30:00, or a date \
-                     with a time, as 2024-03-12T13:26:40"
+                    "--range: \"{text}\" is not a time; expected seconds, as 0.5, a time of day, as 14:30:00, or a \
+                     date with a time, as 2024-03-12T13:26:40"
                 ),
             )
         })

@@ -381,7 +381,7 @@ pub(crate) fn rates_of([least_s, largest_s]: [f64; 2]) -> String {
     let hz = |step_s: f64| rate(step_s, places);
     match least_s > 1e-9 * largest_s {
         true => format!("any rate from {} Hz to {} Hz", hz(largest_s), hz(least_s)),
-        false => format!("any rate from {} Hz on", hz(largest_s)),
+        false => format!("any rate of {} Hz or more", hz(largest_s)),
     }
 }
 

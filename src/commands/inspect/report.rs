@@ -58,10 +58,10 @@ pub(super) struct InspectedFile {
     pub(super) mcap: Option<Inventory>,
 }
 
-/// A pair of key and value out of a file's head.
+/// A pair of key and value out of a file's header.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub(super) struct Detail {
-    /// Name in the head of the recording.
+    /// Name in the header of the recording.
     pub(super) key: String,
     /// Text beside the name.
     pub(super) value: String,

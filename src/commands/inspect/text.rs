@@ -69,7 +69,7 @@ impl InspectedFile {
         if self.details.len() > MOST_DETAILS {
             let more = self.details.len() - MOST_DETAILS;
             text.push_str(&format!(
-                "  … and {more} more in the head (--json has all)\n"
+                "  … and {more} more in the header (--json has all)\n"
             ));
         }
         for segment in &self.segments {

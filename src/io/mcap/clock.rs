@@ -1,5 +1,7 @@
 //! Comparison of the clock of the messages' own stamps with that of the recorder.
 
+use crate::print::plural;
+
 /// Largest difference of two clocks without a warning, in ns: one day.
 const DAY_NS: i64 = 86_400_000_000_000;
 /// Largest drift between the clocks without a warning, relative to the record's length.
@@ -44,7 +46,8 @@ impl ClockCheck {
     pub fn warnings(&self) -> Vec<String> {
         let mut said = Vec::new();
         if self.zeros > 0 {
-            said.push(format!("{} messages have a time stamp of zero", self.zeros));
+            let messages = plural(self.zeros, "message");
+            said.push(format!("{messages} with a time stamp of zero"));
         }
         let (Some((first, least, greatest)), Some((start, end))) = (self.offsets, self.log) else {
             return said;

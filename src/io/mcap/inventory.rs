@@ -25,6 +25,7 @@ use super::time::Stamp;
 use super::units;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
+use crate::print::plural;
 use crate::warning::Warning;
 
 /// Maximum number of leaves of a channel with an example value.
@@ -372,7 +373,7 @@ impl Scan {
         for channel in channels {
             if channel.out_of_order > 0 {
                 let message = format!(
-                    "{}: {} of {} messages were logged before the preceding one",
+                    "{}: messages logged before the preceding one: {} of {}",
                     channel.topic, channel.out_of_order, channel.messages
                 );
                 say("mcap-out-of-order", message);
@@ -382,8 +383,8 @@ impl Scan {
             }
         }
         if self.broken > 0 {
-            let message = format!("{} message records are truncated", self.broken);
-            say("mcap-skipped", message);
+            let records = plural(self.broken, "truncated message record");
+            say("mcap-skipped", format!("{records} skipped"));
         }
         warnings.extend(summary::conflict(self.channels.conflicts));
         warnings

@@ -4,6 +4,7 @@ use super::decode::Damage;
 use super::order::{Sorter, WINDOW};
 use super::record::reader::RecordReader;
 use super::signal::{SelectedSignal, TopicSignal};
+use crate::print::plural;
 use crate::warning::Warning;
 
 /// Summary of a signal.
@@ -61,7 +62,7 @@ impl Skipped {
         let (log_time_ns, damage) = self.first.as_ref()?;
         Some(format!(
             "{} {what}; the first, logged at {log_time_ns} ns: {damage}",
-            self.count
+            plural(self.count, "message")
         ))
     }
 }
@@ -98,26 +99,26 @@ impl Tally {
         let SelectedSignal { topic, field, .. } = &signal.selected;
         let mut warnings = Vec::new();
         let mut say = |code, message: String| warnings.push(Warning::new(code, message));
-        if let Some(said) = self.unreadable.say("messages could not be read") {
+        if let Some(said) = self.unreadable.say("could not be read") {
             say("mcap-unreadable", format!("{topic}: {said}"));
         }
-        let what = format!("messages have no {field}");
+        let what = format!("without {field}");
         if let Some(said) = self.without_item.say(&what) {
             say("mcap-without-item", format!("{topic}: {said}"));
         }
         if let (Some(by_name), 1..) = (&signal.by_name, self.moved) {
             let message = format!(
-                "{topic}: the item that {field} is in the first message changes its index in {} later ones; it was \
-                 tracked by its name, as {by_name} does",
-                self.moved
+                "{topic}: the item that {field} is in the first message changes its index in {}; it was tracked by its \
+                 name, as {by_name} does",
+                plural(self.moved, "later message")
             );
             say("mcap-items-move", message);
         }
         let without_spacing = signal.blocks.without_spacing;
         if self.without_time + broken + without_spacing > 0 {
             let message = format!(
-                "{topic}: {} messages without a usable time, {without_spacing} without a usable sample spacing and \
-                 {broken} truncated were skipped",
+                "{topic}: messages skipped: {} without a usable time, {without_spacing} without a usable sample \
+                 spacing, {broken} truncated",
                 self.without_time
             );
             say("mcap-skipped", message);
@@ -163,7 +164,7 @@ impl SignalSummary {
 /// Warning about declarations that contradict an earlier one.
 pub(super) fn conflict(conflicts: u64) -> Option<Warning> {
     let message = format!(
-        "{conflicts} schemas or channels are declared again with different content; the first declaration was used"
+        "schemas or channels declared again with different content: {conflicts}; the first declaration was used"
     );
     (conflicts > 0).then(|| Warning::new("mcap-conflict", message))
 }
@@ -184,7 +185,7 @@ pub(super) fn losses(records: &RecordReader, last_ns: Option<i64>) -> Vec<Warnin
         .collect();
     let more = losses.count - losses.first.len();
     if more > 0 {
-        let message = format!("{name}: {more} more losses of this kind");
+        let message = format!("{name}: further losses of this kind: {more}");
         warnings.push(Warning::new("mcap-more-losses", message));
     }
     warnings
@@ -196,15 +197,15 @@ fn out_of_order(topic: &str, sorter: &Sorter) -> Vec<Warning> {
     let mut say = |code, message: String| warnings.push(Warning::new(code, message));
     if sorter.out_of_order > 0 {
         let message = format!(
-            "{topic}: {} samples arrived after a later one and were sorted",
-            sorter.out_of_order - sorter.too_late
+            "{topic}: sorted {} that arrived after a later one",
+            plural(sorter.out_of_order - sorter.too_late, "sample")
         );
         say("mcap-out-of-order", message);
     }
     if sorter.too_late > 0 {
         let message = format!(
-            "{topic}: {} samples arrived more than {WINDOW} samples late and were dropped; sort the file by time first",
-            sorter.too_late
+            "{topic}: dropped {} that arrived more than {WINDOW} samples late; sort the file by time first",
+            plural(sorter.too_late, "sample")
         );
         say("mcap-too-late", message);
     }

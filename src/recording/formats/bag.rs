@@ -7,7 +7,7 @@ use crate::io::Reading;
 
 pub(super) const BAG: Format = Format {
     name: "db3",
-    called: "no file that torqcomp reads",
+    called: "not a file that torqcomp can read",
     is,
     takes: &[],
     read,

@@ -13,7 +13,7 @@ pub const LONGEST_LINE: usize = 1 << 24;
 pub fn too_long_a_line() -> Failure {
     Failure::failed(
         ErrorCode::NotARecording,
-        "a line is longer than 16 MiB: this is no table of numbers",
+        "a line is longer than 16 MiB: this is not a table of numbers",
     )
 }
 /// Bytes per piece: large enough to be fast, small enough to stay in cache.

@@ -69,7 +69,7 @@ pub struct Event {
     /// Previous stamp, in s.
     #[serde(rename = "after_s")]
     pub from_s: f64,
-    /// Its length in s; negative if time runs backwards.
+    /// Length in s; negative if time runs backwards.
     #[serde(rename = "length_s")]
     pub step_s: f64,
 }

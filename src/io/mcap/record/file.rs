@@ -209,7 +209,7 @@ impl Loss {
                 "chunks listed in the file's index but missing: {chunks}, the first at byte {at}"
             ),
             Self::Count { what, told, found } => {
-                write!(f, "the file counts {told} {what}, {found} were found")
+                write!(f, "the file declares {told} {what}, but contains {found}")
             }
             _ => Ok(()),
         }

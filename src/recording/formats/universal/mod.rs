@@ -124,7 +124,7 @@ fn data_set(
     left_out: &mut Vec<String>,
 ) -> Result<bool, Failure> {
     let Some(head) = Head::read(lines)? else {
-        content.lost = Some(cut("within the head of a data set"));
+        content.lost = Some(cut("within the header of a data set"));
         return Ok(false);
     };
     let (wanted, each) = head.numbers();

@@ -68,7 +68,10 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
         1,
     );
     let start = MathcadHead::of(&head).ok_or_else(|| {
-        Failure::failed(ErrorCode::DamagedFile, "the first four lines are no head")
+        Failure::failed(
+            ErrorCode::DamagedFile,
+            "the first four lines are not a header",
+        )
     })?;
     let mut lines = text.split_inclusive(|byte| *byte == b'\n');
     let skipped: usize = lines.by_ref().take(HEAD).map(<[u8]>::len).sum();

@@ -24,7 +24,7 @@ const DIALECT: Dialect = Dialect {
 /// The rules.
 pub const ALL: &[Rule] = &[
     (
-        Maker::of_seconds("Rigol, start and increment in the head").with_reader(read),
+        Maker::of_seconds("Rigol, start and increment in the header").with_reader(read),
         |head| Start::of(head).is_some(),
     ),
     (Maker::of_seconds("Rigol"), |head| {
