@@ -48,11 +48,11 @@ fn the_list_of_effects_is_that_of_the_code() {
          transition_speed = \"40 N m/s\"\n```\n\n\
          `diagnose` finds effects in records and writes them into the stand file, `simulate` applies them, and \
          `compensate` removes them ([how](compensation.md)). In the equations, `n` is a torque in the stand, \
-         `x'' + 2 zeta w0 x' + w0^2 (x + n) = w0^2 G u`, and `y` is the record. Units are powers of N m and s, whatever \
-         the unit of the record from which a calibration gives the torque; for a stand with `static_gain`, N m is \
-         replaced by the unit of the record in that key, V in the tables below. Bounds are those of `diagnose`, in \
-         multiples of `rms` and `peak` of the record about its mean, of `w0` and `f0`, the natural frequency in rad/s and \
-         Hz, and of the `length` of the record in s. A stand file may exceed them.\n\n"
+         `x'' + 2 zeta w0 x' + w0^2 (x + n) = w0^2 G u`, and `y` is the record. The tables show V for the unit of the \
+         record. For a stand that gives torque, with a calibration for example, read N m instead, whatever the unit of \
+         the record; for one with `static_gain`, the unit of the record in that key. Bounds are those of `diagnose`, \
+         in multiples of `rms` and `peak` of the record about its mean, of `w0` and `f0`, the natural frequency in \
+         rad/s and Hz, and of the `length` of the record in s. A stand file may exceed them.\n\n"
     );
     for effect in EFFECTS {
         write!(page, "- [`{0}`](#{0})", effect.name).unwrap();
@@ -186,7 +186,7 @@ fn the_list_of_stand_keys_is_that_of_the_code() {
 fn takes_text(takes: Takes) -> String {
     match takes {
         Takes::Text => "text".to_owned(),
-        Takes::Word => "one of several words".to_owned(),
+        Takes::Word => "keyword".to_owned(),
         Takes::Whole => "whole number".to_owned(),
         Takes::Quantity(kind) => match kind.unit(UnitSystem::Si) {
             "1" => format!("{}, `\"{}\"`", kind.name(), kind.example()),

@@ -47,7 +47,7 @@ pub(crate) struct ManifestEntry {
     pub(super) warnings: Vec<NotedWarning>,
     #[serde(flatten)]
     pub(super) figures: RecordFigures,
-    /// Time that the recording took, in s.
+    /// Processing time, in s.
     pub(super) seconds: f64,
 }
 
@@ -60,7 +60,7 @@ pub(crate) struct RunBegin {
     pub(super) version: String,
     #[serde(flatten)]
     pub(super) made_by: MadeBy,
-    /// Which part of the recordings, as `3/8`; `None` if all.
+    /// Which part of the recordings, as `3/8`; `null` if all.
     pub(super) shard: Option<String>,
     /// All recordings of the job.
     pub(super) all: WholeList,

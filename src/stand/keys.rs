@@ -87,16 +87,16 @@ pub(crate) const SECTIONS: &[StandSection] = &[
         ("common_std", Quantity(Kind::Ratio), "relative standard uncertainty common to these three, as when two follow \
             from a declared third (`identify` and `diagnose` write it); the `std` of each includes it, and it cancels \
             in the response"),
-        ("correlation_inertia_damping", Quantity(Kind::Ratio), "correlation coefficient of the errors of both, -1 to 1; 0 by default (`identify response` writes it)"),
-        ("correlation_inertia_stiffness", Quantity(Kind::Ratio), "likewise"),
-        ("correlation_damping_stiffness", Quantity(Kind::Ratio), "likewise"),
+        ("correlation_inertia_damping", Quantity(Kind::Ratio), "correlation coefficient between the errors of inertia and damping, -1 to 1; 0 by default (`identify response` writes it)"),
+        ("correlation_inertia_stiffness", Quantity(Kind::Ratio), "likewise between the errors of inertia and stiffness"),
+        ("correlation_damping_stiffness", Quantity(Kind::Ratio), "likewise between the errors of damping and stiffness"),
         ("natural_frequency", Quantity(Kind::Frequency), "`√(K/J)/2π`, in place of the three"),
         ("damping_ratio", Quantity(Kind::Ratio), "`f/(2 √(K J))`, with `natural_frequency`"),
         ("static_gain", RecordQuantity, "static ratio of recorded to applied quantity, `\"1 V/V\"` or `\"2.5 mV/N\"`, \
             for stands that do not measure torque; with `natural_frequency` or `[[modes]]` only"),
         ("measures", Word, "`displacement` (default, or the torque of the beam), `speed` or `acceleration`: what is recorded; `static_gain` is then that of the displacement, with the unit of the record, as in `\"3e-7 (m/s^2)/N\"`"),
     ]),
-    ("[[modes]]", "A mode of the stand, in place of the keys of `[mechanics]` above: the response is the sum of `(r + q s/ω) ω²/(s² + 2ζω s + ω²)` over all modes. What the residues leave of 1 is the compliance of modes above the band.", &[
+    ("[[modes]]", "A mode of the stand, in place of the keys of `[mechanics]` above: the response is the sum of `(r + q s/ω) ω²/(s² + 2ζω s + ω²)` over all modes. The remainder, 1 − Σ r, is the compliance of the modes above the band.", &[
         ("natural_frequency", Quantity(Kind::Frequency), "`ω/2π`"),
         ("damping_ratio", Quantity(Kind::Ratio), "`ζ`"),
         ("residue", Quantity(Kind::Ratio), "`r`: its fraction of the static response"),
@@ -104,12 +104,12 @@ pub(crate) const SECTIONS: &[StandSection] = &[
         ("shape_at_load", Quantity(Kind::Ratio), "instead of `residue`, for all modes: mode shape where the torque \
             acts, of modes of unit modal mass in any common scale"),
         ("shape_at_gage", Quantity(Kind::Ratio), "likewise at the gage"),
-        ("correlation_frequency_damping", Quantity(Kind::Ratio), "correlation coefficient of the errors of both, -1 to 1; 0 by default (`identify response` writes it)"),
-        ("correlation_frequency_residue", Quantity(Kind::Ratio), "likewise"),
-        ("correlation_damping_residue", Quantity(Kind::Ratio), "likewise"),
-        ("correlation_frequency_quadrature", Quantity(Kind::Ratio), "likewise"),
-        ("correlation_damping_quadrature", Quantity(Kind::Ratio), "likewise"),
-        ("correlation_residue_quadrature", Quantity(Kind::Ratio), "likewise"),
+        ("correlation_frequency_damping", Quantity(Kind::Ratio), "correlation coefficient between the errors of frequency and damping, -1 to 1; 0 by default (`identify response` writes it)"),
+        ("correlation_frequency_residue", Quantity(Kind::Ratio), "likewise between the errors of frequency and residue"),
+        ("correlation_damping_residue", Quantity(Kind::Ratio), "likewise between the errors of damping and residue"),
+        ("correlation_frequency_quadrature", Quantity(Kind::Ratio), "likewise between the errors of frequency and quadrature"),
+        ("correlation_damping_quadrature", Quantity(Kind::Ratio), "likewise between the errors of damping and quadrature"),
+        ("correlation_residue_quadrature", Quantity(Kind::Ratio), "likewise between the errors of residue and quadrature"),
         ("source", Text, "where the numbers come from (informative)"),
     ]),
     ("[calibration]", "A measured calibration, in one of six forms; it replaces gage, bridge and recorder gain. The `std` of each quantity enters the stated uncertainty.", &[
