@@ -49,8 +49,8 @@ const BUILD: &str = concat!(
 /// The beam and the stator of a stand ring; torqcomp divides the stand's response out of a record.
 /// Results go to standard output or -o, messages to standard error.
 ///
-/// Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but data were lost (or --strict turned a
-/// warning into a failure).
+/// Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done, but data were lost (or --strict was given
+/// and there was a warning).
 #[derive(Debug, Parser)]
 #[command(name = "torqcomp", version, long_version = BUILD, arg_required_else_help = true)]
 pub struct Cli {
@@ -151,7 +151,7 @@ pub enum Format {
 #[derive(Debug, Clone, Args)]
 pub struct OneChannel {
     /// Recording to read (CSV, TSV, a recorder's text export, or MCAP), or - for standard input; several, folders and
-    /// patterns such as 'logs/**/*.csv' with -o FOLDER/ (--help)
+    /// patterns such as 'logs/**/*.csv' with -o FOLDER/
     #[arg(value_name = "INPUT", required_unless_present = "files_from")]
     pub inputs: Vec<PathBuf>,
     /// Which channel.
@@ -381,7 +381,8 @@ pub struct Table {
     /// Frequency step
     #[arg(long, value_name = "HZ", default_value = "10", allow_negative_numbers = true, value_parser = positive_frequency)]
     pub step: f64,
-    /// Add standard uncertainties, propagated from those of the stand's constants; empty if the stand has effects
+    /// Add standard uncertainties, propagated from those of the stand's constants and effects; a cell is empty if its
+    /// uncertainty is unknown
     #[arg(long)]
     pub uncertainty: bool,
     /// Print JSON instead of CSV

@@ -539,7 +539,7 @@ fn every_std_of_the_stand_file_is_stated() {
     assert!((stated - 0.01).abs() < 1e-9, "{stated}");
 }
 
-/// Every example of `docs/stand-file.md`, on a recording in its unit: "Each `1 mV/V` reads 25 N m".
+/// Every example of `docs/stand-file.md`, on a recording in its unit: "`1 mV/V` corresponds to 25 N m".
 #[test]
 fn the_examples_of_the_stand_file_read_what_they_say() {
     let page = include_str!("../docs/stand-file.md");
@@ -549,8 +549,8 @@ fn the_examples_of_the_stand_file_read_what_they_say() {
             continue;
         };
         let (toml, _) = toml.split_once("```").unwrap();
-        let (_, said) = part.split_once("Each `1 ").expect(part);
-        let (unit, said) = said.split_once("` reads ").unwrap();
+        let (_, said) = part.split_once("`1 ").expect(part);
+        let (unit, said) = said.split_once("` corresponds to ").unwrap();
         let want: f64 = said.split_once(' ').unwrap().0.parse().unwrap();
         let folder = Folder::new();
         folder.write("stand.toml", toml);

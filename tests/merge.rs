@@ -173,11 +173,11 @@ fn a_part_that_is_there_twice_counts_once_if_its_results_are_the_same() {
     let changed: Vec<String> = lines.collect();
     assert_ne!(changed.join("\n") + "\n", second);
     folder.write("copy.jsonl", changed.join("\n") + "\n");
-    let said = format!("1 recording: {file} (figures)");
+    let said = format!(": {file} (figures)");
     folder.run(&twice).says(
         1,
         &[
-            "[differing-results] copy.jsonl: other results than in",
+            "[differing-results] copy.jsonl: the results of 1 recording differ from those in",
             &said,
             "no table",
         ],
@@ -269,7 +269,7 @@ fn runs_of_different_jobs_are_refused() {
         &folder,
         &[
             "[other-options]",
-            "2-of-3.jsonl: another set of options",
+            "2-of-3.jsonl: the set of options",
             "--band=800 instead of none",
         ],
     );

@@ -71,7 +71,7 @@ fn what_the_model_does_not_cover_is_left_unexplained() {
         constant["note"]
             .as_str()
             .unwrap()
-            .contains("do not show which")
+            .contains("cannot distinguish them")
     );
 }
 

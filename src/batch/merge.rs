@@ -195,7 +195,7 @@ fn other_job(first: &LastRun, run: &LastRun) -> Option<MergeProblem> {
     let (begin, other) = (&run.begin, &first.begin);
     let differs = |code, what: &str, this: &str, that: &str| {
         let message = format!(
-            "another {what} than in {}: {this} instead of {that}; runs of one job have the same",
+            "the {what} differs from that in {}: {this} instead of {that}; all runs of a job must use the same",
             first.manifest
         );
         Some(MergeProblem::of(run, code, message))
@@ -245,7 +245,8 @@ fn other_stands(runs: &[LastRun]) -> Vec<MergeProblem> {
         let mut read = run.entries.iter().filter(is_read);
         let entry = read.find(|entry| entry.made_from.stand_sha256 != *wanted)?;
         let message = format!(
-            "{} was made with another stand ({}) than {} of {} ({}); run all with the same stand and --skip-existing",
+            "{} was made with a different stand file ({}) from {} of {} ({}); run all with the same stand file and \
+             --skip-existing",
             entry.file,
             stand_text(&entry.made_from),
             first.file,
@@ -351,8 +352,8 @@ fn differing_results([first, other]: [&String; 2], files: &[String]) -> MergePro
         code: "differing-results",
         manifest: Some(other.clone()),
         message: format!(
-            "{other}: other results than in {first} of {}: {}; omit the outdated manifest, or run these recordings \
-             again",
+            "{other}: the results of {} differ from those in {first}: {}; omit the outdated manifest, or run these \
+             recordings again",
             plural(files.len() as u64, "recording"),
             summary::some_of(files, files.len())
         ),

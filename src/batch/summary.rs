@@ -195,7 +195,7 @@ impl BatchResult<'_> {
         let left_out = &self.plan.left_out;
         if !left_out.is_empty() {
             let names = some_of(left_out, left_out.len());
-            text += &format!("no recordings by their content, skipped: {names}\n");
+            text += &format!("skipped, not recordings judging by their content: {names}\n");
         }
         if self.plan.history.unread > 0 {
             let lines = plural(self.plan.history.unread as u64, "line");
@@ -301,7 +301,7 @@ fn failures<'a>(entries: impl Iterator<Item = &'a ManifestEntry>) -> String {
     let line = |entry: &ManifestEntry| {
         let (word, input) = (word(entry.exit), &entry.input);
         let why = entry.error.as_deref();
-        let why = why.unwrap_or("data were lost, or --strict turned a warning into a failure");
+        let why = why.unwrap_or("data were lost, or there was a warning and --strict was given");
         match why.starts_with(input) {
             true => format!("torqcomp: {word}: {why}\n"),
             false => format!("torqcomp: {word}: {input}: {why}\n"),

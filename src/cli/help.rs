@@ -297,8 +297,8 @@ const EXAMPLES: &[(&str, [&str; 2])] = &[
     (
         "simulate",
         [
-            "torqcomp simulate run.csv --stand stand.toml --applied torque -o answer.csv",
-            "torqcomp simulate run.csv --stand refined.toml --applied 2 --unit \"N m\" -o answer.csv",
+            "torqcomp simulate run.csv --stand stand.toml --applied torque -o response.csv",
+            "torqcomp simulate run.csv --stand refined.toml --applied 2 --unit \"N m\" -o response.csv",
         ],
     ),
     (

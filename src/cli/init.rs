@@ -98,8 +98,8 @@ pub struct Init {
     /// Record at no load, such as "12 mA"
     #[arg(long, value_name = "QUANTITY")]
     pub zero: Option<String>,
-    /// Standard uncertainty of one of these, by the name of its flag, such as "sensitivity=0.0005 mV/V"; repeatable. A limit
-    /// within which all values are as likely is to be divided by 1.73
+    /// Standard uncertainty of one of the values above, named by its flag, such as "sensitivity=0.0005 mV/V";
+    /// repeatable. For a limit within which all values are equally likely, give the limit divided by 1.73
     #[arg(long, value_name = "FLAG=QUANTITY", value_parser = named_std)]
     pub std: Vec<(String, String)>,
     /// Output.

@@ -8,7 +8,7 @@ use super::OutputArgs;
 /// Arguments of `completions`.
 #[derive(Debug, Args)]
 pub struct Completions {
-    /// Shell that completes
+    /// Shell to generate the script for
     #[arg(value_enum)]
     pub shell: Shell,
     /// The script.

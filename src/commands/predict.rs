@@ -13,7 +13,7 @@ use self::report::{PredictedConstant, Refinement, residual_percent};
 use super::{Outcome, conclude, publish};
 use crate::cli::{Predict, Strictness};
 use crate::failure::{ErrorCode, Failure};
-use crate::print::rounded;
+use crate::print::{enumeration, rounded};
 use crate::stand::{self, BeamDrawing, BridgeData, Given, Stand, TransducerSignal};
 
 /// Maximum remaining fraction of a residual for an effect to explain it.
@@ -298,9 +298,10 @@ impl<'a> Drawing<'a> {
         }
         causes.push("an end of the beam that is restrained against rotation".to_owned());
         Some(format!(
-            "measured is {} times predicted; {} can each contribute, and the constants alone do not show which",
+            "measured is {} times predicted; possible causes, alone or together: {}; the constants cannot distinguish \
+             them",
             rounded(factor, 3),
-            causes.join(", ")
+            enumeration(&causes, "or")
         ))
     }
 }
@@ -403,9 +404,9 @@ fn damping_note(damping: &PredictedConstant) -> Option<String> {
     let ratio = damping.predicted? / damping.measured?;
     (ratio < FAR_TOO_SMALL).then(|| {
         format!(
-            "friction over speed gives {} of the measured damping; the rest is not in the drawing and is most likely \
-             dissipated in the beam and its joints",
-            rounded(ratio, 2)
+            "the friction slope explains only {} % of the measured damping; the rest is not in the drawing and is most \
+             likely dissipated in the beam and its joints",
+            rounded(100.0 * ratio, 2)
         )
     })
 }

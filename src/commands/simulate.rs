@@ -12,7 +12,7 @@ use crate::file_name::ShowPath;
 use crate::io::output::Output;
 use crate::io::{ChannelChoice, Flags, Input};
 use crate::outcome::{Made, RecordFigures};
-use crate::print::{Report, short};
+use crate::print::{Report, enumeration, plural, short};
 use crate::recording::moment::Moment;
 use crate::recording::{AlignedChannels, ChannelStream, UniformStream, resampled};
 use crate::stand::{self, Calibration, Stand, TransducerSignal};
@@ -289,18 +289,18 @@ impl Report for SimulateReport {
     fn text(&self) -> String {
         let effects = match self.effects.as_slice() {
             [] => "no effects".to_owned(),
-            some => some.join(", "),
+            some => enumeration(some, "and"),
         };
         let answer = match self.is_steady {
             true => ", the steady-state response to their repetition",
             false => "",
         };
         format!(
-            "simulated {} samples at {} Hz, {} steps a sample, with {effects}{answer}; applied {} in {}, {} between \
-             samples; measured in {}\n",
+            "simulated {} samples at {} Hz ({} per sample) with {effects}{answer}; input \"{}\" in {}, {} between \
+             samples; output in {}\n",
             self.samples,
             short(self.rate_hz),
-            self.steps_per_sample,
+            plural(self.steps_per_sample, "integration step"),
             self.applied,
             self.applied_unit,
             self.input_between_samples,

@@ -161,7 +161,8 @@ fn constant_rows(constants: &[NamedEstimate]) -> Vec<Vec<String>> {
             _ => String::new(),
         };
         let unit = constant.estimate.unit().to_owned();
-        vec![constant.name.replace('_', " "), text, std, unit, part]
+        let name = constant.name.replace("held_out", "hold-out");
+        vec![name.replace('_', " "), text, std, unit, part]
     };
     let head = ["", "value", "std", "unit", "relative"];
     with_head(&head, constants.iter().map(row))

@@ -459,7 +459,7 @@ fn a_sensitivity_that_jumps_is_refused() {
             let channels = ["--load", "load", "--reading", "bridge"];
             folder
                 .run(&[&["identify", "static", "in.csv"], &channels[..]].concat())
-                .says(1, &["from load 30 on", "range"]);
+                .says(1, &["at loads of 30 and above", "range"]);
         }
     }
 }

@@ -135,7 +135,8 @@ impl BandReport {
                 length(self.seconds)
             ),
             BandSource::HeldSamples => {
-                "a fifth of the rate of new values: each is held for several samples".to_owned()
+                "set to a fifth of the update rate, because each value is held for several samples"
+                    .to_owned()
             }
             BandSource::Record => {
                 "chosen for the least expected error from the record and its noise".to_owned()

@@ -6,7 +6,7 @@ use torqcomp_model::effects::{Action, FoundLine, Unrecovered};
 use super::report::{CompensateReport, LostSpan, RemovedLine, UndoneEffect};
 use crate::failure::{ErrorCode, Failure};
 use crate::inverse::{Carried, ChainInverse, InverseResult, RecordWindow, Spread};
-use crate::print::rounded;
+use crate::print::{plural, rounded};
 use crate::recording::{Spool, UniformRecord};
 use crate::stand::{ConstantStd, Stand};
 use crate::warning::Warning;
@@ -98,8 +98,8 @@ fn check(record: &UniformRecord<Spool>, undo: &ChainInverse) -> Result<(), Failu
         return Err(Failure::failed(
             ErrorCode::TooManySamples,
             format_args!(
-                "the record has {count} samples; the effects of this stand are removed in memory, from at most \
-             {MOST_SAMPLES}; cut the record into parts of {} s",
+                "the record has {count} samples; an effect of this stand needs the whole record in memory, at most \
+                 {MOST_SAMPLES} samples; cut the record into parts of {} s",
                 rounded(MOST_SAMPLES as f64 / record.rate_hz, 3)
             ),
         ));
@@ -271,12 +271,17 @@ fn lost_warning(effect: &str, lost: &Unrecovered, spans: &[[f64; 2]], scales: &S
     Warning::new(
         "not-recovered",
         format!(
-            "{}: {}; {} samples, from {}{more}: within {} ms of them the torque is not recovered",
+            "{}: {}; {}, from {}{more}: within {} ms of {} the torque is not recovered",
             effect,
             lost.why,
-            lost.samples.len(),
+            plural(lost.samples.len(), "sample"),
             told.join(", "),
-            rounded(1e3 * scales.reach_s, 2)
+            rounded(1e3 * scales.reach_s, 2),
+            if lost.samples.len() == 1 {
+                "it"
+            } else {
+                "them"
+            }
         ),
     )
 }

@@ -341,12 +341,18 @@ impl CompensateReport {
 
     /// Amount filled in, and its range of influence.
     pub(super) fn filled_summary(&self) -> String {
+        self.filled_with("")
+    }
+
+    /// The same with a list of the places after the amount.
+    fn filled_with(&self, places: &str) -> String {
         let samples: usize = self.filled.iter().map(|span| span.samples).sum();
         format!(
-            "{} at {}, which affects the result within {} ms of them",
+            "{} at {}{places}; the result within {} ms of {} is affected",
             plural(samples, "sample"),
             plural(self.filled.len(), "place"),
-            rounded(1e3 * self.reach_s, 3)
+            rounded(1e3 * self.reach_s, 3),
+            if samples == 1 { "it" } else { "them" }
         )
     }
 
@@ -372,7 +378,7 @@ impl CompensateReport {
             0 => String::new(),
             more => format!(" and {more} more, which --json lists"),
         };
-        format!("{}: {}{more}", self.filled_summary(), each.join(", "))
+        self.filled_with(&format!(": {}{more}", each.join(", ")))
     }
 
     fn effects_text(&self) -> String {
@@ -384,12 +390,12 @@ impl CompensateReport {
 
 fn resampled_text(resampled: &Resampled) -> String {
     format!(
-        "{} samples interpolated to {}; {} filled by linear interpolation ({} samples, longest step {} s), {} dropped, \
-         jitter up to {} % of a step",
+        "{} samples interpolated to {}; {} filled by linear interpolation ({}, longest step {} s), {} dropped, jitter \
+         up to {} % of a step",
         resampled.samples_in,
         resampled.samples_out,
         plural(resampled.gaps, "gap"),
-        resampled.bridged,
+        plural(resampled.bridged, "sample"),
         rounded(resampled.longest_step_s, 4),
         plural(resampled.repeated, "repeated time stamp"),
         rounded(100.0 * resampled.largest_jitter, 2)

@@ -262,9 +262,9 @@ fn of_gaps(resampled: &Resampled) -> Option<Warning> {
         Warning::new(
             "resampled-gaps",
             format!(
-                "{} in the time stamps filled by linear interpolation ({} samples, longest step {} s), {} dropped",
+                "{} in the time stamps filled by linear interpolation ({}, longest step {} s), {} dropped",
                 plural(resampled.gaps, "gap"),
-                resampled.bridged,
+                plural(resampled.bridged, "sample"),
                 rounded(resampled.longest_step_s, 4),
                 plural(resampled.repeated, "repeated time stamp")
             ),

@@ -67,14 +67,16 @@ impl HarmonicsReport {
             (_, None) => return "unknown (no std is given)".to_owned(),
             (ConstantStd::Relative(std), _) => format!("{} %", rounded(100.0 * std, 2)),
             (ConstantStd::NotNeeded, _) => {
-                return "that of the response is \"± stand\" below; that of the recorded torque is unknown".to_owned();
-            }
-            (ConstantStd::Unknown, _) => {
-                return "unknown, since the calibration has no std; that of the response alone is \"± response\" below"
+                return "unknown for the recorded torque; columns \"± stand\": response alone"
                     .to_owned();
             }
+            (ConstantStd::Unknown, _) => {
+                return "unknown: the calibration has no std; columns \"± response\": response alone".to_owned();
+            }
         };
-        format!("{constant} of the static constant; with the response \"± stand\" below")
+        format!(
+            "static constant {constant}; columns \"± stand\": static constant and response together"
+        )
     }
 
     fn taken_as_text(&self) -> String {

@@ -93,9 +93,9 @@ pub(super) fn from_ratios(
 }
 
 /// Note if no constant is known to scale the ratios.
-const ONLY_RATIOS: &str = "natural frequency and damping ratio, which compensate needs, are determined, but only \
-    ratios of inertia, damping and stiffness; for the constants themselves, give --inertia or --stiffness, or a stand \
-    file that declares one";
+const ONLY_RATIOS: &str = "the test gives natural frequency and damping ratio, which is all that compensate needs; of \
+    inertia, damping and stiffness it gives only ratios. For the constants themselves, give --inertia or --stiffness, \
+    or a stand file that declares one";
 
 /// The known constant, and whether it comes from the command line.
 fn known(

@@ -15,7 +15,7 @@ use super::{DecayOptions, Ringing, present, restart};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::Identification;
 use crate::identify::hum::{SteadyLine, without_mains};
-use crate::print::short;
+use crate::print::{plural, short};
 
 /// Maximum number of fitted samples, over all segments.
 const MOST_SAMPLES: usize = 20_000;
@@ -250,20 +250,22 @@ impl Cuts {
             .extend(present::restart(&self.restarts_s, OWN_PARTS));
         if left_clipped > 0 {
             result.method.push(format!(
-                "each decay is fitted from its last clipped sample on; {left_clipped} samples before that are excluded"
+                "each decay is fitted from its last clipped sample on, which excludes {}",
+                plural(left_clipped, "sample")
             ));
         }
         if left_out > 0 {
             result.method.push(format!(
-                "each decay is fitted up to twice the time after which it is lost in the noise; {left_out} later \
-                 samples of noise are excluded"
+                "each decay is fitted up to twice the time at which it falls below the noise, which excludes {} of \
+                 noise",
+                plural(left_out, "later sample")
             ));
         }
         if self.stretches.is_empty() {
             return Err(Failure::failed(
                 ErrorCode::NotIdentifiable,
                 if left_clipped > 0 {
-                    "no free decay is left behind the last clipped sample; record with a larger range"
+                    "no free decay is left after the last clipped sample; record with a larger range"
                 } else {
                     "no free decay found; try another channel or --range"
                 },

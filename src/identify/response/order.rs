@@ -85,7 +85,7 @@ pub(super) fn order(
     if best == 0 {
         return Err(Failure::failed(
             ErrorCode::NotIdentifiable,
-            "no mode explains held-out data: the measured signal does not follow the applied one; check --applied, \
+            "no mode explains the hold-out data: the measured signal does not follow the applied one; check --applied, \
              --measured and --band",
         ));
     }

@@ -145,7 +145,7 @@ fn raw_error(result: &mut Identification, set: &Set, lines: &Lines) {
         return;
     }
     result.comparisons.push(Comparison {
-        method: "the measured response itself, without a model, on held-out data".to_owned(),
+        method: "the measured response itself, without a model, on hold-out data".to_owned(),
         parameters: vec![NamedEstimate::new("held_out_error", "%", percent, None)],
         fit: None,
     });

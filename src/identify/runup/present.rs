@@ -7,7 +7,7 @@ use crate::chart::{Chart, Series};
 use crate::identify::{Identification, Motion};
 use crate::print::{rounded, short};
 
-/// Noise power in a regressor, relative to its total, above which a warning is given.
+/// Noise power in a measured term, relative to its total, above which a warning is given.
 const NOISY: f64 = 0.2;
 
 /// Names and units of the columns.
@@ -112,8 +112,8 @@ pub(super) fn warnings(
         result.warn(
             "noisy-motion",
             format!(
-                "{} % of a regressor's power is noise; its bias was removed, but a longer --window or a better sensor \
-                 is safer",
+                "up to {} % of the power of a measured term (acceleration or speed) is noise; the resulting bias was \
+                 removed, but a longer --window or a better sensor is safer",
                 rounded(100.0 * fitted.fit.noise_share, 2)
             ),
         );

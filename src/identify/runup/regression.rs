@@ -35,8 +35,9 @@ pub(super) struct Corrected {
 /// Solves `A x ≈ b` over the chosen rows, where the errors of the columns have a known covariance N in
 /// every row: `(AᵀA − n N) x = Aᵀb` (T. Söderström, Errors-in-variables methods in system
 /// identification, Automatica 43 (2007), 939, bias-compensating least squares). For its covariance see
-/// [`scatter`].
+/// [`scatter`]. `names` are those of the columns, for messages.
 pub(super) fn solve(
+    names: &[&str],
     columns: &[Vec<f64>],
     right: &[f64],
     chosen: &[bool],
@@ -53,8 +54,8 @@ pub(super) fn solve(
         return Err(Failure::failed(
             ErrorCode::NotIdentifiable,
             format_args!(
-                "term {} of the equation of motion is zero in the whole record",
-                i + 1
+                "the {} term of the equation of motion is zero throughout the record",
+                names[i].replace('_', " ")
             ),
         ));
     }

@@ -4,6 +4,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use torqcomp_dsp::weak::{Window, white_noise_variance};
 
 use super::directions::Directions;
+use super::present::names;
 use super::regression::{Corrected, Errors, left_side, solve};
 use super::{COLOURED, FreeRun, LEAST_WINDOWS, SHORTEST_HALF};
 use crate::failure::{ErrorCode, Failure};
@@ -26,6 +27,8 @@ pub(super) struct WindowRows {
     pub clean: Vec<bool>,
     /// Derivative order of each column, if its noise is known.
     orders: Vec<Option<usize>>,
+    /// Name of each column.
+    names: Vec<&'static str>,
     window: Window,
     variance: f64,
 }
@@ -69,6 +72,7 @@ impl WindowRows {
             centres.iter().map(average).collect()
         };
         let (columns, orders) = terms(run, directions, split, centres.len(), &column);
+        let names = names(run, directions, split).into_iter();
         let sure = |c: &usize| !directions.unsure[c - half..=c + half].contains(&true);
         Ok(Self {
             half,
@@ -78,6 +82,7 @@ impl WindowRows {
             slope: column(run.effort, 1),
             clean: centres.iter().map(sure).collect(),
             orders,
+            names: names.map(|(name, _)| name).collect(),
             window: window.clone(),
             variance: white_noise_variance(run.motion).unwrap_or(0.0),
         })
@@ -162,7 +167,7 @@ impl WindowRows {
             motion: &|lag, factors| self.motion_errors(lag, factors),
             overlap: 2 * self.half / self.stride,
         };
-        solve(&self.columns, &self.right, used, &errors)
+        solve(&self.names, &self.columns, &self.right, used, &errors)
     }
 }
 
@@ -188,6 +193,7 @@ impl FittedRows {
         let with = WindowRows {
             columns: [&rows.columns[..], std::slice::from_ref(&rows.slope)].concat(),
             orders: [&rows.orders[..], &[None]].concat(),
+            names: [&rows.names[..], &["delay"]].concat(),
             right: rows.right.clone(),
             slope: Vec::new(),
             clean: Vec::new(),

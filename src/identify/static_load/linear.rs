@@ -75,8 +75,8 @@ pub(super) fn refuse_two_ranges(points: &[Point], steps: &LoadSteps) -> Result<(
     Err(Failure::failed(
         ErrorCode::UnsuitableRecord,
         format_args!(
-            "the sensitivity jumps: from load {} on it is {} times that below, as with two ranges of an amplifier; \
-             record all loads in one range, or evaluate the rows of each range separately",
+            "the sensitivity jumps: at loads of {} and above it is {} times that at smaller loads, as with two ranges \
+             of an amplifier; record all loads in one range, or evaluate the rows of each range separately",
             rounded(from, 4),
             rounded(ratio, 3)
         ),

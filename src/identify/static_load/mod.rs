@@ -63,7 +63,7 @@ pub struct Term {
     pub name: &'static str,
     /// The formula, and the standards that define it.
     pub formula: &'static str,
-    /// Largest value over the loads in per cent; `None` if the record lacks the readings for it.
+    /// Largest value over the loads in per cent; `null` if the record lacks the readings for it.
     pub percent: Option<f64>,
 }
 
@@ -213,7 +213,7 @@ fn follows(points: &[Point], fit: &LoadCurve, largest: f64) -> Result<(), Failur
         .map(|p| (p.load.abs(), (p.reading - zero).abs()));
     let why = match correlation(&unsigned.collect::<Vec<_>>()) > ALIKE {
         true => {
-            "without their signs they do: write the minus sign of the loads, or of the readings, that turn the other way"
+            "their magnitudes do agree: give the loads, or the readings, of one direction a minus sign"
         }
         false => {
             "check that the columns are the right ones and the rows in the order in which they were taken"
