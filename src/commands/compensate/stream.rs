@@ -7,7 +7,7 @@ use torqcomp_dsp::compensate::{BlockConvolver, InverseFilter, Windows};
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::quality::streamed::StreamedFaults;
 use torqcomp_dsp::resample::{Resampled, Resampler};
-use torqcomp_dsp::spectrum::{Density, PowerSum, welch};
+use torqcomp_dsp::spectrum::{Density, PowerSum, welch_to_the_ends};
 
 use super::above::{AboveBand, power_above};
 use super::report::CompensateReport;
@@ -195,10 +195,12 @@ impl<'a> Gathered<'a> {
 
     /// Power density of the record, if it is long enough.
     fn density(&self, rate_hz: f64) -> Option<Density> {
-        self.power.density(rate_hz).or_else(|| {
-            let block = (self.first.len() / 2).next_power_of_two() / 2;
-            welch(&self.first, rate_hz, block).ok()
-        })
+        if self.first.len() == excerpt::OF_STREAM {
+            return self.power.density(rate_hz);
+        }
+        // The few blocks of the transforms leave gaps.
+        let block = (self.first.len() / 2).next_power_of_two() / 2;
+        welch_to_the_ends(&self.first, rate_hz, block.min(self.power.block_length())).ok()
     }
 }
 

@@ -223,7 +223,12 @@ fn of_noise(noise: &RecordNoise, report: &CompensateReport) -> Vec<Warning> {
     }
     // A chosen band ends at the least expected error, possibly above the frequency where the noise equals the signal.
     let lost_from_hz = noise.lost_from_hz(band_hz);
-    if let Some(from_hz) = lost_from_hz.filter(|hz| report.band.is_given() || *hz == 0.0) {
+    let is_amplified = |from_hz: f64| {
+        let mut gains = report.noise.gain.iter();
+        gains.any(|at| at.frequency_hz >= from_hz && at.gain > 1.0)
+    };
+    let matters = |hz: &f64| *hz == 0.0 || report.band.is_given() && is_amplified(*hz);
+    if let Some(from_hz) = lost_from_hz.filter(matters) {
         let remedy = if from_hz > 0.0 {
             format!("--band {} excludes it", rounded(from_hz, 4))
         } else {

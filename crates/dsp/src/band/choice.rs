@@ -24,7 +24,7 @@ use super::{Band, EDGE, Edge, FALLBACK_FRACTION};
 use crate::compensate::Inverse;
 use crate::noise_density::NoiseDensity;
 use crate::quality::quantisation::quantisation;
-use crate::spectrum::{Density, welch_steep};
+use crate::spectrum::{Density, welch_to_the_ends};
 
 /// Grid frequencies per decade.
 const PER_DECADE: i32 = 96;
@@ -95,7 +95,7 @@ impl BandSearch {
             return None;
         }
         let block = (longest_here / 2 + 1).next_power_of_two().min(longest);
-        let density = welch_steep(samples, rate_hz, block).ok()?;
+        let density = welch_to_the_ends(samples, rate_hz, block).ok()?;
         let mut search = Self::of_density(&density, rate_hz, inverse)?;
         if let Some(found) = quantisation(samples) {
             search.count_rounding(found.step.powi(2) / 12.0);
@@ -315,6 +315,30 @@ mod tests {
 
     fn best(density: &Density) -> Option<BandChoice> {
         BandSearch::of_density(density, RATE, &inverse())?.best()
+    }
+
+    /// A sine of 900 Hz in the last fortieth of a record, beside one of 20 Hz.
+    #[test]
+    fn what_begins_shortly_before_the_end_counts() {
+        let mut state = 5_u64;
+        let mut noise = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let wave = |hz: f64, i: usize| (std::f64::consts::TAU * hz * i as f64 / RATE).sin();
+        let sample = |i: usize| {
+            let late = if i < 39_000 { 0.0 } else { wave(900.0, i) };
+            wave(20.0, i) + late + 0.01 * noise()
+        };
+        let mut record: Vec<f64> = (0..40_000).map(sample).collect();
+        for _ in 0..2 {
+            let found = BandSearch::of_record(&record, RATE, &inverse()).unwrap();
+            let found = found.best().unwrap();
+            assert!((880.0..1000.0).contains(&found.top_hz), "{found:?}");
+            record.reverse();
+        }
     }
 
     #[test]
