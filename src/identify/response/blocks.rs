@@ -140,7 +140,9 @@ fn impacts(recorded: &[Driven], result: &mut Identification) -> Result<Set, Fail
         (transient, noise)
     };
     let rings = |(r, range): &(usize, Range<usize>)| {
-        still_rings(&records[*r].measured[range.start..range.start + length])
+        let measured = &records[*r].measured[range.start..range.start + length];
+        // A constant level is no ringing.
+        still_rings(&without_offset(measured))
     };
     let window = window_for(good.iter().any(rings), length);
     let (cut, noises): (Vec<Transient>, Vec<f64>) = good.iter().map(of).unzip();
