@@ -4,6 +4,7 @@
 mod beginnings;
 mod decay;
 mod files;
+mod late_channels;
 mod response;
 mod runup;
 mod short_hits;

@@ -95,10 +95,18 @@ fn periods(length: usize, count: usize, noise: &mut Noise) -> (Vec<f64>, Vec<f64
     (applied, many(&|w| response_at(w, NATURAL, RATIO)))
 }
 
-/// Displacement of a mode of 60 Hz and damping ratio 0.03 under a force, with a static gain of 1, by the Runge–Kutta
-/// method in 16 steps per sample; both at 1 kHz.
+/// Displacement of a mode of 60 Hz and damping ratio 0.03 under a force, with a static gain of 1; both at 1 kHz.
 pub(super) fn driven_by(force: impl Fn(f64) -> f64, count: usize) -> (Vec<f64>, Vec<f64>) {
-    let (natural, ratio, steps) = (TAU * 60.0, 0.03, 16);
+    driven_mode(NATURAL, force, count)
+}
+
+/// The same for any natural frequency in rad/s, by the Runge–Kutta method in 16 steps per sample.
+pub(super) fn driven_mode(
+    natural: f64,
+    force: impl Fn(f64) -> f64,
+    count: usize,
+) -> (Vec<f64>, Vec<f64>) {
+    let (ratio, steps) = (RATIO, 16);
     let h = 1.0 / RATE_HZ / f64::from(steps);
     let slope =
         |t: f64, x: f64, v: f64| natural * natural * (force(t) - x) - 2.0 * ratio * natural * v;

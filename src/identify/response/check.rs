@@ -117,7 +117,7 @@ pub(super) fn leakage(result: &mut Identification, set: &Set, fitted: &Modal) {
 }
 
 /// Residual relative to the measured signal above which the fit is poor.
-const POOR: f64 = 0.3;
+pub(super) const POOR: f64 = 0.3;
 
 /// Warns about reasons to doubt the fit.
 pub(super) fn doubts(result: &mut Identification, found: &FinalFit, leads: bool) {

@@ -7,6 +7,7 @@ mod inverse;
 mod kind;
 mod lines;
 mod modal;
+mod next;
 mod order;
 mod present;
 mod scatter;
@@ -15,6 +16,7 @@ mod shift;
 mod whole;
 
 use clap::ValueEnum;
+use num_complex::Complex64;
 use torqcomp_model::Covariance;
 
 use super::mode::all_or_none;
@@ -119,6 +121,9 @@ pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identif
     };
     let of = (&set, &lines);
     let fitted = final_fit(whole, of, options, (&data, &coarse), &mut result)?;
+    if order::is_unexplained(&held_out) && !(fitted.relative < check::POOR) {
+        return Err(order::unexplained());
+    }
     let options = &options.with_delay_of(Some(&fitted.modal));
     if leads && check::is_out_of_reach(&set, &fitted.modal) {
         return Err(Failure::failed(ErrorCode::UnsuitableRecord, check::LEADS));
@@ -159,6 +164,10 @@ struct FinalFit {
     relative: f64,
     /// Largest relative error of the gain due to noise in the applied signal.
     gain_error: f64,
+    /// Bayesian information criterion of a fit to whole records, for comparison with others; otherwise infinite.
+    criterion: f64,
+    /// Response in the residual of whole records at the lines of the averaged response; otherwise empty.
+    residual: Vec<Complex64>,
     /// Standard uncertainty of the static response.
     static_gain_std: Option<f64>,
 }
@@ -200,10 +209,10 @@ fn without_undamped(
     coarse: Modal,
     result: &mut Identification,
 ) -> Result<Modal, Failure> {
-    let mut starts = coarse.poles;
+    let (mut starts, delay_s) = (coarse.poles, coarse.delay_s);
     let mut left_out = Vec::new();
     loop {
-        let fitted = data.fit(&starts, Effort::Fine)?;
+        let fitted = data.fit(&starts, delay_s, Effort::Fine)?;
         let undamped = fitted
             .poles
             .iter()
@@ -234,7 +243,9 @@ fn final_fit(
     result: &mut Identification,
 ) -> Result<FinalFit, Failure> {
     let refined = match &mut whole {
-        Some(whole) => shift::refined(whole, set, data, coarse)?.map(|fitted| (whole, fitted)),
+        Some(whole) => {
+            order::of_whole(whole, set, options, (data, coarse))?.map(|fitted| (whole, fitted))
+        }
         None => None,
     };
     if let Some((whole, fitted)) = refined {
@@ -248,7 +259,7 @@ fn final_fit(
         }
         return Ok(late.unwrap_or(fitted));
     }
-    let mut modal = data.fit(&coarse.poles, Effort::Fine)?;
+    let mut modal = data.fit(&coarse.poles, coarse.delay_s, Effort::Fine)?;
     check::leakage(result, set, &modal);
     let searched = modal.fit.as_ref().map_or(0, |fit| fit.values.len());
     if scatter::is_of_force(set, lines, data, &modal) {
@@ -256,6 +267,9 @@ fn final_fit(
     }
     let all = scatter::of_all(set, lines, data, &modal)?;
     let of_poles = scatter::of_poles(set, lines, data, &modal)?;
+    if data.with_delay {
+        modal.delay_std_s = of_poles.std(2 * modal.poles.len());
+    }
     foreign::mark(&mut modal, &of_poles, set);
     let is_alone = modal.of_stand().len() == 1 && modal.poles.len() > 1;
     let static_gain_std = |all: &Covariance| static_gain_std(&modal, all, searched);
@@ -268,6 +282,8 @@ fn final_fit(
         linear: searched,
         relative: set.error(&modal.response, lines),
         gain_error: 0.0,
+        criterion: f64::INFINITY,
+        residual: Vec::new(),
         modal,
     })
 }

@@ -7,6 +7,14 @@
 //! m is 0 for displacement, 1 for speed, 2 for acceleration; c_1 represents modes above the band, c_2 those below and
 //! free motion. Residues and c are linear and follow from the poles, so only poles and delay are searched for (variable
 //! projection: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973), 413).
+//!
+//! An exponential window e^{−at} on both signals moves the whole response: H(s + a) takes the place of H(s), also in the
+//! factor of the delay, e^{−(s+a)τ}.
+//!
+//! With a delay, the modes are normal modes, R_k = −j A_k with a real A_k (D. J. Ewins, Modal Testing, 2nd ed., 2000,
+//! 2.4). Complex residues would make the delay unidentifiable: s [R/(s − p) + R*/(s − p*)] = R p/(s − p) + R* p*/(s −
+//! p*) + 2 Re R, so the derivative of the model with respect to τ is a sum of its columns, and those of second order in
+//! τ are as well while R is imaginary.
 
 use std::sync::Mutex;
 use torqcomp_dsp::sort_by_number;
@@ -36,6 +44,9 @@ pub(super) struct Data {
     /// Whether c₂ is fitted: a stand on its spring has no free motion.
     pub below: bool,
 }
+
+/// Longest delay in half periods of the highest frequency.
+const DELAY_HALF_PERIODS: f64 = 8.0;
 
 /// Precision of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,6 +86,11 @@ impl Data {
         self.omega[self.omega.len() / 2]
     }
 
+    /// Longest delay that is searched for, of either sign, in s.
+    pub(super) fn longest_delay_s(&self) -> f64 {
+        DELAY_HALF_PERIODS * std::f64::consts::PI / self.band_rad_per_s().1
+    }
+
     /// First and last frequency, in rad/s.
     pub(super) fn band_rad_per_s(&self) -> (f64, f64) {
         (self.omega[0], self.omega[self.omega.len() - 1])
@@ -85,14 +101,22 @@ impl Data {
         1 + usize::from(self.below)
     }
 
-    /// The columns at a frequency, written to `all`.
+    /// Whether a linear parameter of a model with this many modes is zero: with a delay, the real part of a residue.
+    pub(super) fn is_zero(&self, linear: usize, modes: usize) -> bool {
+        self.with_delay && linear < 2 * modes && linear.is_multiple_of(2)
+    }
+
+    /// The columns at a frequency, written to `all`; zero for parameters that are zero.
     fn columns(&self, omega: f64, poles: &[Pole], delay_s: f64, all: &mut Vec<Complex64>) {
         let scale = self.scale();
         let (front, s) = self.front(omega, delay_s, scale);
         all.clear();
         for pole in poles {
             let (near, far) = self.fractions(s, *pole, scale);
-            all.push(front * (near + far));
+            all.push(match self.with_delay {
+                true => Complex64::ZERO,
+                false => front * (near + far),
+            });
             all.push(front * Complex64::I * (near - far));
         }
         all.push(front);
@@ -101,12 +125,12 @@ impl Data {
         }
     }
 
-    /// The factor before the sum, and s.
+    /// The factor before the sum, and s, with the window's rate as its real part.
     pub(super) fn front(&self, omega: f64, delay_s: f64, scale: f64) -> (Complex64, Complex64) {
-        let s = Complex64::new(0.0, omega / scale);
+        let s = Complex64::new(self.added_rate, omega) / scale;
         let late = match delay_s == 0.0 {
             true => Complex64::ONE,
-            false => Complex64::cis(-omega * delay_s),
+            false => (-s * (scale * delay_s)).exp(),
         };
         let power = match self.order {
             0 => Complex64::ONE,
@@ -116,15 +140,19 @@ impl Data {
         (power * late, s)
     }
 
-    /// 1/(s − p) and 1/(s − p*), with the window's rate in p.
+    /// 1/(s − p) and 1/(s − p*).
     pub(super) fn fractions(&self, s: Complex64, pole: Pole, scale: f64) -> (Complex64, Complex64) {
-        let p = Complex64::new(-(pole.rate_per_s + self.added_rate), pole.omega_rad_per_s) / scale;
+        let p = Complex64::new(-pole.rate_per_s, pole.omega_rad_per_s) / scale;
         (1.0 / (s - p), 1.0 / (s - p.conj()))
     }
 
     /// Linear parameters for given poles, and weighted residuals with alternating real and imaginary
     /// parts.
-    fn solve(&self, poles: &[Pole], delay_s: f64) -> Result<linear::LinearFit, FitError> {
+    pub(super) fn solve(
+        &self,
+        poles: &[Pole],
+        delay_s: f64,
+    ) -> Result<linear::LinearFit, FitError> {
         let count = 2 * poles.len() + self.outside();
         let lines = self.omega.len();
         let mut design = DMatrix::zeros(2 * lines, count);
@@ -152,12 +180,15 @@ impl Data {
         Ok(self.modal_of(poles, (delay_s, None), &linear))
     }
 
-    /// Fits from start values of the poles.
+    /// Fits from start values of the poles and of the delay, which is fitted only together with modes.
     ///
     /// # Errors
     /// [`FitError`] if there are too few lines.
-    pub fn fit(&self, starts: &[Pole], effort: Effort) -> Result<Modal, FitError> {
-        let parameters = self.parameters(starts);
+    pub fn fit(&self, starts: &[Pole], start_s: f64, effort: Effort) -> Result<Modal, FitError> {
+        let parameters = match starts.is_empty() {
+            true => Vec::new(),
+            false => self.parameters(starts, start_s),
+        };
         let problem = PoleSearch {
             data: self,
             modes: starts.len(),
@@ -215,7 +246,7 @@ impl Data {
     }
 
     /// Poles and delay with their start values and bounds.
-    fn parameters(&self, starts: &[Pole]) -> Vec<Parameter> {
+    fn parameters(&self, starts: &[Pole], start_s: f64) -> Vec<Parameter> {
         let (low, high) = (self.omega[0], self.omega[self.omega.len() - 1]);
         let mut parameters = Vec::new();
         for (k, pole) in starts.iter().enumerate() {
@@ -226,9 +257,10 @@ impl Data {
             parameters.push(omega.at_least(0.4 * low).at_most(1.3 * high));
         }
         if self.with_delay {
-            let step = std::f64::consts::PI / high;
-            let delay = Parameter::new("delay", 0.0).scaled(step);
-            parameters.push(delay.at_least(-8.0 * step).at_most(8.0 * step));
+            let most_s = self.longest_delay_s();
+            let start_s = start_s.clamp(-most_s, most_s);
+            let delay = Parameter::new("delay", start_s).scaled(most_s / DELAY_HALF_PERIODS);
+            parameters.push(delay.at_least(-most_s).at_most(most_s));
         }
         parameters
     }
@@ -248,52 +280,6 @@ impl Data {
         let mut slopes = DMatrix::zeros(2 * self.omega.len(), values.len() + linear);
         problem.tangent(values, linear, &mut slopes)?;
         Ok(slopes)
-    }
-
-    /// Start values for one more mode: the strongest line of the residual that is not within a relative distance
-    /// `apart` of a mode.
-    pub fn next_pole(&self, so_far: &Modal, apart: f64) -> Option<Pole> {
-        let left: Vec<f64> = (0..self.omega.len())
-            .map(|i| self.weight[i] * (self.response[i] - so_far.response[i]).norm())
-            .collect();
-        let near = |omega: f64| {
-            so_far
-                .poles
-                .iter()
-                .any(|p| (omega / p.omega_rad_per_s - 1.0).abs() < apart)
-        };
-        let open = (0..left.len()).filter(|i| !near(self.omega[*i]));
-        let best = open.max_by(|a, b| left[*a].total_cmp(&left[*b]))?;
-        let below = |i: &usize| left[*i] < std::f64::consts::FRAC_1_SQRT_2 * left[best];
-        let from = (0..best).rev().find(below).unwrap_or(0);
-        let to = (best + 1..left.len()).find(below).unwrap_or(left.len() - 1);
-        let wide = 0.5 * (self.omega[to] - self.omega[from]);
-        let rest = Data {
-            response: self
-                .response
-                .iter()
-                .zip(&so_far.response)
-                .map(|(a, b)| a - b)
-                .collect(),
-            ..self.clone()
-        };
-        let mut found: Option<(f64, Pole)> = None;
-        for (rate, shift) in [0.1, 0.3, 0.6, 1.0, 2.0]
-            .iter()
-            .flat_map(|r| [-0.5, 0.0, 0.5].map(|s| (*r, s)))
-        {
-            let pole = Pole {
-                rate_per_s: (rate * wide - self.added_rate).max(1e-3 * wide),
-                omega_rad_per_s: self.omega[best] + shift * wide,
-            };
-            let Ok(solved) = rest.solve(&[pole], so_far.delay_s) else {
-                continue;
-            };
-            if found.is_none_or(|(least, _)| solved.sum_of_squares < least) {
-                found = Some((solved.sum_of_squares, pole));
-            }
-        }
-        found.map(|(_, pole)| pole)
     }
 }
 
@@ -342,7 +328,7 @@ impl PoleSearch<'_> {
         }
         if self.data.with_delay {
             let model: Complex64 = columns.iter().zip(linear).map(|(c, v)| c * v).sum();
-            all.push(Complex64::new(0.0, -omega) * model);
+            all.push(-s * scale * model);
         }
     }
 }
@@ -408,6 +394,10 @@ impl PoleSearch<'_> {
                 column.unscale_mut(size);
             }
         }
+        // A column of zeros would give an arbitrary one of Q.
+        let modes = poles.len();
+        let free = (0..design.ncols()).filter(|j| !self.data.is_zero(j + kept, modes));
+        let design = design.select_columns(&free.collect::<Vec<usize>>());
         if design.ncols() > 0 {
             let q = design.qr().q();
             let made_up = &q * q.tr_mul(out);
@@ -520,7 +510,7 @@ mod tests {
                 with_delay: false,
                 below: true,
             };
-            let fitted = data.fit(&[pole], Effort::Fine).unwrap();
+            let fitted = data.fit(&[pole], 0.0, Effort::Fine).unwrap();
             let (residue, _) = fitted.residue(0);
             let want = Complex64::new(0.0, -0.25 / pole.omega_rad_per_s);
             assert!((residue - want).norm() < 1e-6 * want.norm(), "{residue}");

@@ -1,10 +1,11 @@
 //! Number of modes, chosen by the hold-out error.
 
-use torqcomp_dsp::frf::{self, Estimator, Powers};
+use torqcomp_dsp::frf::{self, Estimator, Powers, Window};
 
 use super::blocks::Set;
 use super::lines::{self, Lines, MOST_LINES, data};
-use super::{Data, Effort, Modal, ResponseOptions};
+use super::whole::Whole;
+use super::{Data, Effort, FinalFit, Modal, ResponseOptions, shift};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::rounded;
 
@@ -21,19 +22,30 @@ const PATIENCE: usize = 3;
 /// Ratio of the hold-out error of fewer modes to the minimum, up to which they are preferred.
 const SLACK: f64 = 1.05;
 
-/// Adds one mode; `None` if no line is left to start from.
+/// Adds one mode; `None` if no line is left to start from. The first one with a delay starts from a mode without one.
 pub(super) fn grow(
     data: &Data,
     so_far: &Modal,
     options: &ResponseOptions,
 ) -> Result<Option<Modal>, Failure> {
+    if data.with_delay && so_far.poles.is_empty() {
+        let prompt = Data {
+            with_delay: false,
+            ..data.clone()
+        };
+        let Some(first) = grow(&prompt, so_far, options)? else {
+            return Ok(None);
+        };
+        let start_s = shift::likeliest_delay(data, &first)?;
+        return Ok(Some(data.fit(&first.poles, start_s, Effort::Coarse)?));
+    }
     let apart = if options.modes.is_some() { 0.0 } else { APART };
     let Some(pole) = data.next_pole(so_far, apart) else {
         return Ok(None);
     };
     let mut starts = so_far.poles.clone();
     starts.push(pole);
-    Ok(Some(data.fit(&starts, Effort::Coarse)?))
+    Ok(Some(data.fit(&starts, so_far.delay_s, Effort::Coarse)?))
 }
 
 /// Folds of the blocks; each is held out once.
@@ -82,14 +94,99 @@ pub(super) fn order(
     let errors = tried(set, lines, options, &folds)?;
     let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
     let best = errors.iter().position(|e| *e <= SLACK * least).unwrap_or(0);
-    if best == 0 {
-        return Err(Failure::failed(
-            ErrorCode::NotIdentifiable,
-            "no mode explains the hold-out data: the measured signal does not follow the applied one; check --applied, \
-             --measured and --band",
-        ));
-    }
+    // Leakage may hide a mode in blocks, but not in whole records.
+    let best = match (best, set.window) {
+        (0, Window::Hann) if errors.len() > 1 => least_of_some(&errors),
+        (0, _) => return Err(unexplained()),
+        (best, _) => best,
+    };
     Ok((grown(data, options, best)?, errors))
+}
+
+/// The number of modes, one or more, with the smallest hold-out error.
+fn least_of_some(errors: &[f64]) -> usize {
+    (1..errors.len())
+        .min_by(|a, b| errors[*a].total_cmp(&errors[*b]))
+        .unwrap_or(1)
+}
+
+/// Whether no number of modes clearly reduces the hold-out error.
+pub(super) fn is_unexplained(errors: &[f64]) -> bool {
+    let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
+    errors.first().is_some_and(|none| *none <= SLACK * least)
+}
+
+pub(super) fn unexplained() -> Failure {
+    Failure::failed(
+        ErrorCode::NotIdentifiable,
+        "no mode explains held-out data: the measured signal does not follow the applied one; check --applied, \
+         --measured and --band",
+    )
+}
+
+/// The fit of whole records with the fewest modes that explain them, up to the number chosen from the averaged
+/// response: there, leakage of a swept or other unsteady excitation looks like further modes, in held-out blocks as
+/// well. Of the fits that converge, the one with the smallest [criterion](FinalFit::criterion); `None` if none does.
+///
+/// # Errors
+/// If there are too few lines.
+pub(super) fn of_whole(
+    whole: &mut Whole,
+    set: &Set,
+    options: &ResponseOptions,
+    (data, coarse): (&Data, &Modal),
+) -> Result<Option<FinalFit>, Failure> {
+    let all = shift::refined(whole, set, data, coarse)?;
+    if options.modes.is_some() {
+        return Ok(all);
+    }
+    let few = best_of_whole(whole, set, options, data, coarse.poles.len() - 1)?;
+    let both = [all, few].into_iter().flatten();
+    Ok(both.min_by(|a, b| a.criterion.total_cmp(&b.criterion)))
+}
+
+/// The fit of whole records with the smallest [criterion](FinalFit::criterion) of those with 1, 2, … modes. Each further
+/// mode is searched for in the residual of whole records, which has no leakage.
+///
+/// # Errors
+/// If there are too few lines.
+pub(super) fn best_of_whole(
+    whole: &mut Whole,
+    set: &Set,
+    options: &ResponseOptions,
+    data: &Data,
+    most: usize,
+) -> Result<Option<FinalFit>, Failure> {
+    let mut best: Option<FinalFit> = None;
+    let mut seen = data.clone();
+    let mut last = data.fit(&[], 0.0, Effort::Coarse)?;
+    let mut since = 0;
+    for _ in 0..most {
+        let Some(next) = grow(&seen, &last, options)? else {
+            break;
+        };
+        last = next;
+        since += 1;
+        if let Some(found) = whole.refine(data, &last, set) {
+            last = found.modal.clone();
+            seen.response = last
+                .response
+                .iter()
+                .zip(&found.residual)
+                .map(|(h, left)| h + left)
+                .collect();
+            if best
+                .as_ref()
+                .is_none_or(|best| found.criterion < best.criterion)
+            {
+                (best, since) = (Some(found), 0);
+            }
+        }
+        if since >= PATIENCE {
+            break;
+        }
+    }
+    Ok(best)
 }
 
 /// Data of each fold: all blocks except those held out.
@@ -129,7 +226,7 @@ pub(super) fn of_given(
     if folds.len() > 1 {
         let training = training(set, lines, options, &folds);
         let models = side_by_side(&training, |data, _| {
-            Ok(data.fit(&all.poles, Effort::Coarse)?)
+            Ok(data.fit(&all.poles, all.delay_s, Effort::Coarse)?)
         })?;
         errors[all.poles.len()] = held_out(set, lines, &folds, &models);
     }
@@ -147,7 +244,7 @@ fn tried(
     let training = training(set, lines, options, folds);
     let mut models: Vec<Modal> = training
         .iter()
-        .map(|d| d.fit(&[], Effort::Coarse))
+        .map(|d| d.fit(&[], 0.0, Effort::Coarse))
         .collect::<Result<_, _>>()?;
     let error = |models: &[Modal]| held_out(set, lines, folds, models);
     let mut errors = vec![error(&models)];
@@ -191,7 +288,7 @@ fn side_by_side(
 
 /// A coarse fit of `count` modes, added one by one.
 fn grown(data: &Data, options: &ResponseOptions, count: usize) -> Result<Modal, Failure> {
-    let mut fitted = data.fit(&[], Effort::Coarse)?;
+    let mut fitted = data.fit(&[], 0.0, Effort::Coarse)?;
     for _ in 0..count {
         fitted = grow(data, &fitted, options)?.unwrap_or(fitted);
     }

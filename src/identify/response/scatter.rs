@@ -68,7 +68,7 @@ pub(super) fn of_poles(
     Ok(match Linearised::of(whole, fitted, residue)? {
         Some(fit) => {
             let matrix = covariance(set, lines, whole, fitted, &fit);
-            Covariance::of_some(&fit.free, fit.searched + 2, matrix)
+            fit.covariance_of(fit.searched + 2, matrix)
         }
         None => Covariance::independent(&vec![None; 2 * fitted.poles.len() + 3]),
     })
@@ -87,7 +87,7 @@ pub(super) fn of_all(
     let linear = fitted.linear().len();
     Ok(Linearised::of(whole, fitted, linear)?.map(|fit| {
         let matrix = covariance(set, lines, whole, fitted, &fit);
-        Covariance::of_some(&fit.free, fit.searched + linear, matrix)
+        fit.covariance_of(fit.searched + linear, matrix)
     }))
 }
 
@@ -122,8 +122,10 @@ fn covariance(
 
 /// The fit, linearised at its minimum.
 struct Linearised {
-    /// Parameters not at a bound: poles and delay, then the first linear parameters.
+    /// Parameters not at a bound: poles and delay, then the first linear parameters, except those that are zero.
     free: Vec<usize>,
+    /// Linear parameters that are zero.
+    zero: Vec<usize>,
     /// Number of parameters for poles and delay.
     searched: usize,
     /// J of the free parameters.
@@ -140,18 +142,30 @@ impl Linearised {
             return Ok(None);
         };
         let searched = fit.values.len();
-        let free: Vec<usize> = (0..searched + linear)
-            .filter(|i| fit.at_bound.get(*i) != Some(&true))
-            .collect();
+        let modes = fitted.poles.len();
+        let is_zero = |i: &usize| *i >= searched && data.is_zero(*i - searched, modes);
+        let (zero, others): (Vec<usize>, Vec<usize>) = (0..searched + linear).partition(is_zero);
+        let free = others.into_iter();
+        let free = free.filter(|i| fit.at_bound.get(*i) != Some(&true));
+        let free: Vec<usize> = free.collect();
         let slopes = data.slopes_at(fitted, linear)?.select_columns(&free);
         let inverse = invert(&slopes.tr_mul(&slopes), 0.0);
         Ok(inverse.map(|inverse| Self {
             free,
+            zero,
             searched,
             slopes,
             inverse,
-            modes: fitted.poles.len(),
+            modes,
         }))
+    }
+
+    /// The covariance of `count` parameters from that of the free ones; the others that are known are zero without
+    /// uncertainty.
+    fn covariance_of(&self, count: usize, of_free: DMatrix<f64>) -> Covariance {
+        let known = [&self.free[..], &self.zero].concat();
+        let matrix = of_free.resize(known.len(), known.len(), 0.0);
+        Covariance::of_some(&known, count, matrix)
     }
 
     fn slope(&self, k: usize, p: usize) -> Complex64 {
@@ -207,6 +221,10 @@ fn from_noise(
     let top = data.weight.iter().copied().fold(0.0, f64::max);
     let counted = data.weight.iter().filter(|w| **w > SILENT * top).count();
     let linear = 2 * solved.modes + data.outside();
+    let linear = linear
+        - (0..linear)
+            .filter(|j| data.is_zero(*j, solved.modes))
+            .count();
     let searched = solved.free.iter().filter(|i| **i < solved.searched).count();
     let freedom = (2 * counted).saturating_sub(searched + linear).max(1);
     let power = 2.0 * squares / freedom as f64;

@@ -1,13 +1,15 @@
 //! Time shift between the channels.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use torqcomp_dsp::frf::Window;
 
 use super::blocks::Set;
 use super::foreign;
 use super::lines::Lines;
-use super::order::grow;
+use super::order::{best_of_whole, grow};
 use super::whole::Whole;
-use super::{Data, Effort, FinalFit, Modal, ResponseOptions};
+use super::{Data, Effort, FinalFit, Modal, ResponseOptions, scatter};
 use crate::failure::Failure;
 use crate::identify::Identification;
 use crate::print::rounded;
@@ -32,7 +34,9 @@ const AS_FEW: f64 = 1.02;
 const SIGNIFICANT: f64 = 3.0;
 
 /// The fit with a delay, if that explains the response with fewer modes about as well as `coarse` does without: a
-/// delay is not a sum of modes, so many modes are needed to imitate one.
+/// delay is not a sum of modes, so many modes are needed to imitate one. Its residual may be larger by what the fewer
+/// parameters explain, `ln N/N` of its power each for N real numbers (Bayesian information criterion, see
+/// [`FinalFit::criterion`]).
 ///
 /// # Errors
 /// If there are too few lines.
@@ -42,7 +46,8 @@ pub(super) fn of(
     (data, coarse): (&Data, &Modal),
     result: &mut Identification,
 ) -> Result<Option<Modal>, Failure> {
-    if data.with_delay || options.modes.is_some() {
+    // Leakage hides a delay; in whole records it is part of the model.
+    if data.with_delay || options.modes.is_some() || set.window == Window::Hann {
         return Ok(None);
     }
     let data = Data {
@@ -50,13 +55,19 @@ pub(super) fn of(
         ..data.clone()
     };
     let has_stand_in = foreign::has_out_of_band(coarse);
-    let slack = if has_stand_in { AS_FEW } else { 1.0 };
-    let enough = slack * set.error(&coarse.response, lines);
+    let least = set.error(&coarse.response, lines);
+    let numbers = 2.0 * lines.len() as f64;
     for late in with_fewer_modes(&data, coarse.poles.len(), options) {
         let late = late?;
-        let std_s = late.delay_std_s;
+        let std_s = scatter::of_poles(set, lines, &data, &late)?.std(2 * late.poles.len());
         let is_known = std_s.is_some_and(|std_s| late.delay_s.abs() > SIGNIFICANT * std_s);
-        if (is_known || has_stand_in) && set.error(&late.response, lines) <= enough {
+        // Three parameters with a normal mode, and the delay.
+        let fewer = 4 * coarse.poles.len() - 3 * late.poles.len() - 1;
+        let slack = match has_stand_in {
+            true => AS_FEW,
+            false => (0.5 * fewer as f64 * numbers.ln() / numbers).exp(),
+        };
+        if (is_known || has_stand_in) && set.error(&late.response, lines) <= slack * least {
             warn(result, late.delay_s);
             return Ok(Some(late));
         }
@@ -64,9 +75,9 @@ pub(super) fn of(
     Ok(None)
 }
 
-/// The fit of whole records with a delay, if its residual is clearly smaller than that of `fitted` without, or no
-/// larger with fewer modes, and it turns the residue of the strongest mode to its phase for a torque:
-/// `R = ∓j/(2 J ω_d)`.
+/// The fit of whole records with a delay, if its residual is clearly smaller than that of `fitted` without, or its
+/// [criterion](FinalFit::criterion) no larger with fewer modes, and it turns the residue of the strongest mode to its
+/// phase for a torque: `R = ∓j/(2 J ω_d)`.
 ///
 /// # Errors
 /// If there are too few lines.
@@ -85,18 +96,20 @@ pub(super) fn of_whole(
     };
     let most = match options.modes {
         Some(_) => 0,
-        None => fitted.modal.poles.len(),
+        None => MOST_MODES.min(fitted.modal.poles.len() - 1),
     };
-    for start in with_fewer_modes(&data, most, options) {
-        let found = whole.refine(&data, &start?, set);
-        if let Some(found) = found.filter(|found| found.relative <= fitted.relative) {
-            return Ok(Some(found));
-        }
+    let found = best_of_whole(whole, set, options, &data, most)?;
+    let is_better = |found: &FinalFit| found.criterion <= fitted.criterion;
+    if let Some(found) = found.filter(is_better) {
+        return Ok(Some(found));
     }
     if turned_by(&fitted.modal) < TURNED {
         return Ok(None);
     }
-    let found = best_delay(whole, set, &data, &fitted.modal)?;
+    let poles = &fitted.modal.poles;
+    let start_s = likeliest_delay(&data, &fitted.modal)?;
+    let start = data.fit(poles, start_s, Effort::Coarse)?;
+    let found = refined(whole, set, &data, &start)?;
     let is_better = |found: &FinalFit| {
         found.relative < CLEARLY_LESS * fitted.relative
             && turned_by(&found.modal) < turned_by(&fitted.modal)
@@ -180,7 +193,7 @@ fn with_fewer_modes(
 ) -> impl Iterator<Item = Result<Modal, Failure>> {
     let next = |last: Option<&Modal>| match last {
         Some(last) => grow(data, last, options),
-        None => grow(data, &data.fit(&[], Effort::Coarse)?, options),
+        None => grow(data, &data.fit(&[], 0.0, Effort::Coarse)?, options),
     };
     let mut last: Option<Modal> = None;
     let most = MOST_MODES.min(count.saturating_sub(1));
@@ -201,6 +214,28 @@ fn delays_of(modal: &Modal) -> Vec<f64> {
         modal.delay_s + late.sin().atan2(late.cos()) / omega
     };
     [-FRAC_PI_2, FRAC_PI_2].map(delay).into()
+}
+
+/// Of the delays that explain the phase of a model's strongest mode, whole half periods apart, the one with which
+/// normal modes at the same poles have the smallest residual.
+///
+/// # Errors
+/// If there are too few lines.
+pub(super) fn likeliest_delay(data: &Data, modal: &Modal) -> Result<f64, Failure> {
+    let Some((_, omega)) = modal.strongest_turn() else {
+        return Ok(0.0);
+    };
+    let most_s = data.longest_delay_s();
+    let halves = (most_s * omega / PI) as i32;
+    let first_s = delays_of(modal).first().copied().unwrap_or(0.0);
+    let mut best = (f64::INFINITY, 0.0);
+    for delay_s in (-halves..=halves).map(|k| first_s + f64::from(k) * PI / omega) {
+        let left = data.solve(&modal.poles, delay_s)?.sum_of_squares;
+        if left < best.0 {
+            best = (left, delay_s);
+        }
+    }
+    Ok(best.1)
 }
 
 /// Sine of the phase of the strongest mode's residue.

@@ -36,10 +36,15 @@ pub(super) struct ParameterValues {
 impl ParameterValues {
     /// Start values: the averaged response, without transients.
     pub fn start(layout: &Parameters, modal: &Modal, records: usize) -> Self {
+        let linear = &modal.linear()[..2 * layout.modes + layout.shape.outside()];
+        let start = |(j, value): (usize, &f64)| match layout.shape.is_zero(j, layout.modes) {
+            true => 0.0,
+            false => *value,
+        };
         Self {
             poles: modal.poles.clone(),
             delay_s: modal.delay_s,
-            linear: modal.linear()[..2 * layout.modes + layout.shape.outside()].to_vec(),
+            linear: linear.iter().enumerate().map(start).collect(),
             transients: vec![vec![0.0; layout.own()]; records],
         }
     }
@@ -68,6 +73,13 @@ impl<'a> Parameters<'a> {
     /// Number of shared parameters.
     pub fn shared(&self) -> usize {
         self.searched() + 2 * self.modes + self.shape.outside()
+    }
+
+    /// Indices of the shared parameters that are fitted, and not zero.
+    pub fn free(&self) -> Vec<usize> {
+        let from = self.searched();
+        let is_free = |i: &usize| *i < from || !self.shape.is_zero(*i - from, self.modes);
+        (0..self.shared()).filter(is_free).collect()
     }
 
     /// Number of parameters of a record, including shared ones.

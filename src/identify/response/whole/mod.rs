@@ -120,8 +120,44 @@ impl Whole {
             has_residues: true,
             covariance,
             gain_error,
+            criterion: criterion(&layout, all),
+            residual: residual_response(&layout, all, &state, shape),
         })
     }
+}
+
+/// Response in the residual, H1 over the lines of all records about each line of the averaged response.
+fn residual_response(
+    layout: &Parameters,
+    all: &[Spectra],
+    state: &ParameterValues,
+    shape: &Data,
+) -> Vec<Complex64> {
+    let last = shape.omega.len() - 1;
+    let step = (shape.omega[last] - shape.omega[0]) / last as f64;
+    let mut sums = vec![(Complex64::ZERO, 0.0); last + 1];
+    for (record, spectra) in all.iter().enumerate() {
+        for (k, omega) in spectra.omega.iter().enumerate() {
+            let place = ((omega - shape.omega[0]) / step).round().max(0.0) as usize;
+            let (cross, power) = &mut sums[place.min(last)];
+            *cross += layout.left(spectra, state, record, k) * spectra.applied[k].conj();
+            *power += spectra.applied[k].norm_sqr();
+        }
+    }
+    let of = |(cross, power): &(Complex64, f64)| match *power > 0.0 {
+        true => cross / power,
+        false => Complex64::ZERO,
+    };
+    sums.iter().map(of).collect()
+}
+
+/// Bayesian information criterion without constant terms, `Σ ln σ² + p ln N`, with the variances σ² of the noise of N
+/// real numbers, learnt from the residual, and p parameters (G. Schwarz, Annals of Statistics 6 (1978), 461).
+fn criterion(layout: &Parameters, all: &[Spectra]) -> f64 {
+    let parameters = layout.own() * all.len() + layout.free().len();
+    let weights = || all.iter().flat_map(|s| &s.weight);
+    let variances: f64 = weights().map(|weight| -4.0 * weight.ln()).sum();
+    variances + parameters as f64 * (2.0 * weights().count() as f64).ln()
 }
 
 /// 1 − g, the largest relative error of the gain for noise before the resonance of this power relative to the input.

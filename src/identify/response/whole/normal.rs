@@ -106,7 +106,14 @@ impl Solved {
             rest -= products.view((own, 0), (shared, own)) * &by_others;
             made_up.push(by_others);
         }
-        let covariance = invert(&rest.columns(0, shared).into(), 0.0)?;
+        let free = layout.free();
+        let of_free = invert(&rest.select_columns(&free).select_rows(&free), 0.0)?;
+        let mut covariance = DMatrix::zeros(shared, shared);
+        for (i, a) in free.iter().enumerate() {
+            for (j, b) in free.iter().enumerate() {
+                covariance[(*a, *b)] = of_free[(i, j)];
+            }
+        }
         let step = &covariance * rest.column(shared);
         let of_record =
             |made_up: &DMatrix<f64>| made_up.column(shared) - made_up.columns(0, shared) * &step;

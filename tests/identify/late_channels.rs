@@ -1,0 +1,144 @@
+//! Responses with a channel that is late by some samples, and what else biased the static gain of hits and sweeps.
+
+use torqcomp::identify::{Identification, NamedEstimate, response};
+
+use super::response::{driven_by, driven_mode};
+use super::{Noise, TAU, of};
+
+const RATE_HZ: f64 = 1000.0;
+/// Natural frequencies of the stand in Hz; its damping ratio is 0.03 and its static gain 1.
+const NATURAL_HZ: f64 = 60.0;
+const SECOND_HZ: f64 = 150.0;
+const RATIO: f64 = 0.03;
+/// Level of the measured signal at rest.
+const LEVEL: f64 = 0.05;
+
+/// The evaluation with default options.
+fn found(applied: &[f64], measured: &[f64]) -> Identification {
+    found_with(applied, measured, None)
+}
+
+/// The same, for a known number of modes.
+fn found_with(applied: &[f64], measured: &[f64], modes: Option<usize>) -> Identification {
+    let record = response::Driven {
+        name: "simulated",
+        rate_hz: RATE_HZ,
+        applied,
+        measured,
+    };
+    let options = response::ResponseOptions {
+        modes,
+        ..Default::default()
+    };
+    response::identify(&[record], &options).unwrap()
+}
+
+fn codes(found: &Identification) -> Vec<&str> {
+    found.warnings.iter().map(|w| w.code).collect()
+}
+
+/// White noise on a signal, about a level.
+fn noisy(signal: &[f64], level: f64, size: f64, noise: &mut Noise) -> Vec<f64> {
+    let one = |v: &f64| v + level + size * noise.normal();
+    signal.iter().map(one).collect()
+}
+
+/// A signal some samples later.
+fn late(signal: &[f64], samples: usize) -> Vec<f64> {
+    let before = vec![signal[0]; samples];
+    [&before[..], &signal[..signal.len() - samples]].concat()
+}
+
+/// Bell-shaped hits at these times, 3 ms to both sides, and the response.
+fn hits(times_s: &[f64], count: usize) -> (Vec<f64>, Vec<f64>) {
+    let bell = |t: f64| (-0.5 * (t / 0.003).powi(2)).exp();
+    driven_by(|t| times_s.iter().map(|at| bell(t - at)).sum(), count)
+}
+
+/// A sweep from 5 to 200 Hz in 8 s.
+fn sweep(t: f64) -> f64 {
+    (TAU * (5.0 * t + 0.5 * (195.0 / 8.0) * t * t)).sin()
+}
+const SWEPT: usize = 8000;
+
+fn is_near(found: &NamedEstimate, truth: f64, what: &str) {
+    let (value, std) = (found.value(), found.std().expect("an uncertainty"));
+    println!("{what}, {}: {value} ± {std}", found.name);
+    assert!(
+        (value - truth).abs() < 4.0 * std && std < 2e-3 * truth,
+        "{what}, {}: {value} ± {std} for {truth}",
+        found.name
+    );
+}
+
+/// Complex residues imitate a delay: the static gain of hits was 0.5 to 2 % too small and the delay 7 % wrong, at ten
+/// and more times their uncertainties, or the delay appeared as a mode above the band.
+#[test]
+fn hits_on_a_late_channel_show_delay_and_gain() {
+    let (applied, shown) = hits(&[0.05, 1.05, 2.05, 3.05], 4000);
+    for samples in [1, 2, 5] {
+        for seed in 31..35 {
+            let mut noise = Noise(seed);
+            let measured = noisy(&late(&shown, samples), LEVEL, 1e-3, &mut noise);
+            let found = found(&applied, &measured);
+            let what = format!("{samples} samples, seed {seed}");
+            is_near(of(&found, "natural_frequency"), NATURAL_HZ, &what);
+            is_near(of(&found, "damping_ratio"), RATIO, &what);
+            is_near(of(&found, "static_gain"), 1.0, &what);
+            is_near(of(&found, "delay"), samples as f64 / RATE_HZ, &what);
+            assert_eq!(codes(&found), ["channels-shifted"], "{what}");
+        }
+    }
+}
+
+/// Leakage of a sweep in segments looked like further modes, or hid the mode and the delay.
+#[test]
+fn a_sweep_on_a_late_channel_shows_one_mode_and_the_delay() {
+    let (applied, shown) = driven_by(sweep, SWEPT);
+    for samples in [0, 1, 2, 3, 5] {
+        let mut noise = Noise(36);
+        let applied = noisy(&applied, 0.0, 2e-3, &mut noise);
+        let measured = noisy(&late(&shown, samples), LEVEL, 2e-3, &mut noise);
+        let found = found(&applied, &measured);
+        let what = format!("{samples} samples");
+        is_near(of(&found, "natural_frequency"), NATURAL_HZ, &what);
+        is_near(of(&found, "damping_ratio"), RATIO, &what);
+        is_near(of(&found, "static_gain"), 1.0, &what);
+        match samples {
+            0 => assert!(codes(&found).is_empty(), "{:?}", codes(&found)),
+            _ => {
+                is_near(of(&found, "delay"), samples as f64 / RATE_HZ, &what);
+                assert_eq!(codes(&found), ["channels-shifted"], "{what}");
+            }
+        }
+    }
+}
+
+/// In segments, up to eight modes were found.
+#[test]
+fn a_sweep_over_two_modes_shows_two() {
+    let (applied, first) = driven_by(sweep, SWEPT);
+    let (_, second) = driven_mode(TAU * SECOND_HZ, sweep, SWEPT);
+    let both = first.iter().zip(&second);
+    let shown: Vec<f64> = both.map(|(a, b)| 0.9 * a + 0.1 * b).collect();
+    let mut noise = Noise(37);
+    let applied = noisy(&applied, 0.0, 2e-3, &mut noise);
+    let found = found(&applied, &noisy(&shown, LEVEL, 2e-3, &mut noise));
+    assert_eq!(found.modes.len(), 2, "{:?}", found.parameters);
+    is_near(of(&found, "mode_1_natural_frequency"), NATURAL_HZ, "first");
+    is_near(of(&found, "mode_2_natural_frequency"), SECOND_HZ, "second");
+    is_near(of(&found, "static_gain"), 1.0, "both");
+    assert!(codes(&found).is_empty(), "{:?}", codes(&found));
+}
+
+/// A constant level counted as a response that still rings and was given an exponential window.
+#[test]
+fn a_level_of_the_bridge_needs_no_window() {
+    let (applied, shown) = hits(&[0.05, 1.05, 2.05, 3.05], 4000);
+    let [with, without] = [LEVEL, 0.0].map(|level| {
+        let found = found(&applied, &noisy(&shown, level, 1e-3, &mut Noise(38)));
+        assert!(!found.method.join(" ").contains("exponential window"));
+        of(&found, "static_gain").value()
+    });
+    assert!((with - without).abs() < 1e-6, "{with} {without}");
+}
