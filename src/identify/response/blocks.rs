@@ -6,6 +6,7 @@ use std::ops::Range;
 use num_complex::Complex64;
 use torqcomp_dsp::frf::{self, Block, Powers, Window};
 
+use super::force::{StrokeNoise, force_of_hit};
 use super::{Driven, Excitation, ResponseOptions, check, kind};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::hum::{self, without_mains};
@@ -27,6 +28,8 @@ pub(super) struct Set {
     pub of_differences: bool,
     /// Whether the blocks are periods.
     pub is_periodic: bool,
+    /// Noise of the force within the stroke of each block, as far as it is known.
+    pub strokes: Vec<(usize, StrokeNoise)>,
 }
 
 impl Set {
@@ -41,6 +44,7 @@ impl Set {
             window,
             of_differences: false,
             is_periodic: false,
+            strokes: Vec::new(),
         }
     }
 
@@ -131,7 +135,8 @@ fn impacts(recorded: &[Driven], result: &mut Identification) -> Result<Set, Fail
     let length = good.iter().map(|(_, range)| range.len()).min().unwrap_or(0);
     let of = |(r, range): &(usize, Range<usize>)| {
         let range = range.start..range.start + length;
-        let (applied, noise) = force_of_hit(&records[*r].applied[range.clone()]);
+        let force = force_of_hit(&records[*r].applied[range.clone()]);
+        let (applied, noise) = (force.samples, (force.stroke, force.bias));
         let transient = Transient {
             record: *r,
             applied,
@@ -145,28 +150,20 @@ fn impacts(recorded: &[Driven], result: &mut Identification) -> Result<Set, Fail
         still_rings(&without_offset(measured))
     };
     let window = window_for(good.iter().any(rings), length);
-    let (cut, noises): (Vec<Transient>, Vec<f64>) = good.iter().map(of).unzip();
-    check::noise_on_force(result, mean(&noises));
-    Ok(transients(&cut, records[0].rate_hz, window, result))
+    let (cut, noises): (Vec<Transient>, Vec<_>) = good.iter().map(of).unzip();
+    let (strokes, biases): (Vec<Option<StrokeNoise>>, Vec<f64>) = noises.into_iter().unzip();
+    check::noise_on_force(result, mean(&biases));
+    let strokes = strokes.into_iter().enumerate();
+    Ok(Set {
+        strokes: strokes.filter_map(|(b, s)| Some((b, s?))).collect(),
+        ..transients(&cut, records[0].rate_hz, window, result)
+    })
 }
 
 /// A signal without its level before the hit.
-fn without_offset(signal: &[f64]) -> Vec<f64> {
+pub(super) fn without_offset(signal: &[f64]) -> Vec<f64> {
     let level = mean(&signal[..8]);
     signal.iter().map(|v| v - level).collect()
-}
-
-/// The force of a hit, set to zero outside the hit if there is only noise. Also the relative bias of the response due
-/// to noise that could not be removed.
-fn force_of_hit(signal: &[f64]) -> (Vec<f64>, f64) {
-    let Some(stroke) = frf::stroke_of(signal) else {
-        return (without_offset(signal), frf::noise_share(signal));
-    };
-    let mut force = vec![0.0; signal.len()];
-    for i in stroke.range {
-        force[i] = signal[i] - stroke.rest;
-    }
-    (force, 0.0)
 }
 
 /// Every record as one transient, whatever its shape. The spectra are those of sample differences over 1 − e^(−jω), as

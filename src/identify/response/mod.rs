@@ -2,6 +2,7 @@
 
 mod blocks;
 mod check;
+mod force;
 mod foreign;
 mod inverse;
 mod kind;

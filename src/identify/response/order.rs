@@ -119,13 +119,13 @@ pub(super) fn is_unexplained(errors: &[f64]) -> bool {
 pub(super) fn unexplained() -> Failure {
     Failure::failed(
         ErrorCode::NotIdentifiable,
-        "no mode explains held-out data: the measured signal does not follow the applied one; check --applied, \
+        "no mode explains hold-out data: the measured signal does not follow the applied one; check --applied, \
          --measured and --band",
     )
 }
 
 /// The fit of whole records with the fewest modes that explain them, up to the number chosen from the averaged
-/// response: there, leakage of a swept or other unsteady excitation looks like further modes, in held-out blocks as
+/// response: there, leakage of a swept or other unsteady excitation looks like further modes, in hold-out blocks as
 /// well. Of the fits that converge, the one with the smallest [criterion](FinalFit::criterion); `None` if none does.
 ///
 /// # Errors
@@ -205,7 +205,7 @@ fn training(
         .collect()
 }
 
-/// Mean error of each fold's model on its held-out blocks.
+/// Mean error of each fold's model on its hold-out blocks.
 fn held_out(set: &Set, lines: &Lines, folds: &[Vec<usize>], models: &[Modal]) -> f64 {
     let each = models.iter().zip(folds).flat_map(|(model, fold)| {
         fold.iter()

@@ -14,7 +14,8 @@
 //! Pintelon, J. Schoukens, System Identification, 2nd ed., 2012, 2.6 and 9; J. S. Bendat, A. G. Piersol, Random Data,
 //! 4th ed., 2010, 9.2.)
 //!
-//! In addition, from the contribution of each block:
+//! In addition, the noise of the force within each stroke, which is short and so correlates all lines ([`from_force`]);
+//! and from the contribution of each block:
 //!
 //! ```text
 //! Cov p = (JᵀJ)⁻¹ Σ_b u_b u_bᵀ (JᵀJ)⁻¹ n/(n − 1),   u_b = Re Σ_k J̄_k w_k X̄_kb (Y_kb − H1_k X_kb)/S_k
@@ -23,6 +24,8 @@
 //! (the infinitesimal jackknife: B. Efron, The Jackknife, 1982, 6.3; overlapping segments together with their
 //! neighbours). It needs no model of the noise and includes leakage and differences between hits, but is imprecise with
 //! few blocks. So it is used alone from [`MANY`] blocks on, and below that where it is significantly larger.
+
+use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
 use num_complex::Complex64;
@@ -98,7 +101,8 @@ fn covariance(
     fitted: &Modal,
     solved: &Linearised,
 ) -> DMatrix<f64> {
-    let noise = from_noise(set, lines, whole, fitted, solved);
+    let noise = from_noise(set, lines, whole, fitted, solved)
+        + from_force(set, lines, whole, fitted, solved);
     let blocks = set.blocks.len();
     if blocks < FEW {
         return noise;
@@ -207,6 +211,51 @@ fn from_blocks(set: &Set, lines: &Lines, data: &Data, solved: &Linearised) -> DM
     }
     let freedom = blocks as f64 / (blocks - 1) as f64;
     &solved.inverse * sum * &solved.inverse * freedom
+}
+
+/// Part due to white noise of variance σ_b² in the samples i of the stroke of each block b, where the force has the
+/// window w_i:
+///
+/// ```text
+/// (JᵀJ)⁻¹ Σ_b σ_b² Σ_i u_bi u_biᵀ (JᵀJ)⁻¹,   u_bi = −Re Σ_k J̄_k w_k X̄_kb H_k w_i e^{−jω_k t_i}/S_k
+/// ```
+///
+/// A single block has this error from the lines near the Nyquist frequency, with aliasing.
+fn from_force(
+    set: &Set,
+    lines: &Lines,
+    data: &Data,
+    fitted: &Modal,
+    solved: &Linearised,
+) -> DMatrix<f64> {
+    let columns = solved.free.len();
+    let mut sum = DMatrix::zeros(columns, columns);
+    if set.blocks.len() == 1 {
+        return sum;
+    }
+    let power = applied_power(set, lines);
+    let length = 2 * (set.blocks[0].applied.len() - 1);
+    for (b, stroke) in &set.strokes {
+        let applied = &set.blocks[*b].applied[lines.clone()];
+        let weighted = |k: usize| match power[k] > 0.0 {
+            true => applied[k].conj() * fitted.response[k] * (data.weight[k] / power[k]),
+            false => Complex64::ZERO,
+        };
+        let weighted: Vec<Complex64> = (0..applied.len()).map(weighted).collect();
+        let scores = DMatrix::from_fn(stroke.samples.len(), columns, |row, p| {
+            let i = stroke.samples.start + row;
+            let at = |k: usize| Complex64::cis(-TAU * (k * i) as f64 / length as f64);
+            let (mut turn, step) = (at(lines.start), at(1));
+            let mut score = 0.0;
+            for (k, error) in weighted.iter().enumerate() {
+                score += (solved.slope(k, p).conj() * error * turn).re;
+                turn *= step;
+            }
+            score * set.window.weight(i, length)
+        });
+        sum += scores.tr_mul(&scores) * stroke.variance;
+    }
+    &solved.inverse * sum * &solved.inverse
 }
 
 /// Estimate from the power of the errors and the window.

@@ -16,6 +16,18 @@ pub enum Window {
     Exponential(f64),
 }
 
+impl Window {
+    /// Weight of a sample in a block of `count` samples.
+    #[must_use]
+    pub fn weight(self, i: usize, count: usize) -> f64 {
+        match self {
+            Self::None => 1.0,
+            Self::Hann => 0.5 - 0.5 * (std::f64::consts::TAU * i as f64 / count as f64).cos(),
+            Self::Exponential(tau) => (-(i as f64) / tau).exp(),
+        }
+    }
+}
+
 /// Spectra of an applied and a measured block of the same length.
 #[must_use]
 pub fn transform(applied: &[f64], measured: &[f64], window: Window) -> Block {
@@ -59,16 +71,11 @@ struct Transform {
 
 impl Transform {
     fn new(count: usize, window: Window) -> Self {
-        let weight = |i: usize| match window {
-            Window::None => 1.0,
-            Window::Hann => 0.5 - 0.5 * (std::f64::consts::TAU * i as f64 / count as f64).cos(),
-            Window::Exponential(tau) => (-(i as f64) / tau).exp(),
-        };
         Self {
             plan: torqcomp_fourier::forward(count),
             weights: match window {
                 Window::None => Vec::new(),
-                _ => (0..count).map(weight).collect(),
+                _ => (0..count).map(|i| window.weight(i, count)).collect(),
             },
             without_mean: window == Window::Hann,
         }
