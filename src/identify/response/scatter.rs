@@ -219,8 +219,6 @@ fn from_blocks(set: &Set, lines: &Lines, data: &Data, solved: &Linearised) -> DM
 /// ```text
 /// (JᵀJ)⁻¹ Σ_b σ_b² Σ_i u_bi u_biᵀ (JᵀJ)⁻¹,   u_bi = −Re Σ_k J̄_k w_k X̄_kb H_k w_i e^{−jω_k t_i}/S_k
 /// ```
-///
-/// A single block has this error from the lines near the Nyquist frequency, with aliasing.
 fn from_force(
     set: &Set,
     lines: &Lines,
@@ -230,9 +228,6 @@ fn from_force(
 ) -> DMatrix<f64> {
     let columns = solved.free.len();
     let mut sum = DMatrix::zeros(columns, columns);
-    if set.blocks.len() == 1 {
-        return sum;
-    }
     let power = applied_power(set, lines);
     let length = 2 * (set.blocks[0].applied.len() - 1);
     for (b, stroke) in &set.strokes {
