@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Correlation, FitQuality, Identification, NamedEstimate};
+use super::{Correlation, FitQuality, Identification, NamedEstimate, decay};
 use crate::chart::Page;
 use crate::print::{Report, columns, relative, rounded, short, value_and_std};
 use crate::provenance::Provenance;
@@ -105,6 +105,29 @@ impl Identification {
         format!("{}: {} samples{rate}", self.inputs.join(", "), self.samples)
     }
 
+    /// The constants of the best damping law, if it has dry friction.
+    fn friction(&self) -> Option<String> {
+        let best = self.laws.first()?;
+        let friction = best.dry_friction?;
+        let unit = self.fit.as_ref().map_or("", |fit| fit.unit.as_str());
+        let stated = |constant: decay::LawConstant| {
+            let [value, std] = match constant.std {
+                Some(std) => value_and_std(constant.value, std),
+                None => [short(constant.value), "unknown".to_owned()],
+            };
+            format!("{value} ± {std}")
+        };
+        let ratio = best
+            .damping_ratio
+            .map(|ratio| format!("damping ratio {}, ", stated(ratio)));
+        Some(format!(
+            "{}: {}friction {} {unit}",
+            best.law.name(),
+            ratio.unwrap_or_default(),
+            stated(friction)
+        ))
+    }
+
     /// Results of other methods, and the damping laws.
     fn sections(&self) -> Vec<ResultTable> {
         let compared = self.comparisons.iter().map(|other| ResultTable {
@@ -119,7 +142,7 @@ impl Identification {
         let laws = (!self.laws.is_empty()).then(|| ResultTable {
             heading: "Damping laws, the best first".to_owned(),
             rows: with_head(&["law", "residual rms", "BIC"], rows),
-            note: None,
+            note: self.friction(),
         });
         compared.chain(laws).collect()
     }

@@ -18,7 +18,7 @@ const COMPARED: usize = 8;
 /// Ratio of the residual of the later part, fitted alone, to that of the whole fit there, below which it is clearly smaller.
 const BETTER: f64 = 0.7;
 /// Ratio of residuals up to which they are equal.
-const AS_GOOD: f64 = 1.25;
+pub(super) const AS_GOOD: f64 = 1.25;
 /// Periods after the start of a segment that are tried as well, and the minimum ratio of the residual in its first half to
 /// that in its last quarter for this.
 const EARLY: [f64; 3] = [1.5, 3.0, 6.0];

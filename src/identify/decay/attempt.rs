@@ -71,6 +71,20 @@ impl<'a> Attempt<'a> {
         Ok(all)
     }
 
+    /// A finished search with one mode and dry friction.
+    pub fn with_friction(fit: ModesFit, wanted: &'a ModeSearch) -> Self {
+        Self {
+            fit,
+            lines: Vec::new(),
+            has_baseline: false,
+            has_tone: false,
+            wanted,
+            taken_off: (&[], 0),
+            takes_tones: false,
+            tones: Vec::new(),
+        }
+    }
+
     /// Whether to search for more modes.
     fn goes_on(&self, resolved: f64) -> bool {
         let modes = self.fit.poles.len() - self.tones.len();

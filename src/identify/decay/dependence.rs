@@ -12,6 +12,11 @@ const CLEARLY: f64 = 10.0;
 /// Minimum relative reduction of the residual, in addition.
 const WORTHWHILE: f64 = 0.01;
 
+/// What the damping ratio is if dry friction was fitted with it. A' = −σA − 2Fω/π is the fall of a mode with the rate
+/// σ + 2Fω/(πA).
+const VISCOUS_PART: &str =
+    "; the one given is its viscous part, to which dry friction F adds 2F/(πA) at the amplitude A";
+
 /// Fits the damping laws to the longest segment and warns if viscous damping is clearly not the best.
 pub(super) fn damping_law(
     result: &mut Identification,
@@ -25,9 +30,13 @@ pub(super) fn damping_law(
         .max_by_key(|s| stretches[*s].values.len())
         .unwrap_or(0);
     let at = 2 + longest * 4;
+    let viscous = match fit.has_friction {
+        true => &modes::fit(stretches, &[pole])?,
+        false => fit,
+    };
     let start = laws::ViscousFit {
-        pole,
-        linear: [0, 1, 2, 3].map(|i| fit.fit.values[at + i]),
+        pole: viscous.poles[0],
+        linear: [0, 1, 2, 3].map(|i| viscous.fit.values[at + i]),
         relative_density: fit.relative_density(stretches, longest, pole),
     };
     let laws = laws::compare(&stretches[longest], &start)?;
@@ -37,11 +46,15 @@ pub(super) fn damping_law(
         && best.criterion < viscous.criterion - CLEARLY
         && best.rms < (1.0 - WORTHWHILE) * viscous.rms
     {
+        let part = match fit.has_friction {
+            true => VISCOUS_PART,
+            false => "",
+        };
         result.warn(
             "not-viscous",
             format!(
                 "{} damping fits the envelope better than viscous damping (residual {} instead of {}): no single \
-                 damping ratio describes this decay",
+                 damping ratio describes this decay{part}",
                 best.law.name(),
                 rounded(best.rms, 3),
                 rounded(viscous.rms, 3)

@@ -10,6 +10,9 @@
 //! | quadratic (drag) | `A' = −β A²` |
 //! | viscous and dry | `A' = −σ A − s` |
 //! | viscous and quadratic | `A' = −σ A − β A²` |
+//!
+//! Laws with dry friction are fitted half cycle by half cycle instead ([`super::friction`], s = 2Fω/π): few half cycles remain
+//! before it stops the stand, and at a displaced zero.
 
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
@@ -17,6 +20,7 @@ use serde::Serialize;
 use torqcomp_dsp::sort_by_number;
 use torqcomp_model::fit::{Fit, FitError, Options, Parameter, WithJacobian, minimize};
 
+use super::friction;
 use super::modes::Stretch;
 use crate::identify::Pole;
 
@@ -60,6 +64,11 @@ impl Law {
         }
     }
 
+    /// Whether it has a dry term.
+    fn is_dry(self) -> bool {
+        self.parts()[1]
+    }
+
     /// Whether it has a viscous, a dry and a quadratic term.
     fn parts(self) -> [bool; 3] {
         match self {
@@ -78,20 +87,17 @@ impl From<Law> for &'static str {
     }
 }
 
-/// Amplitude at time t from a start A₀ with rates σ (1/s), s (units/s) and β (1/(unit s)).
+/// Amplitude at time t from a start A₀ with rates σ (1/s) and β (1/(unit s)).
 ///
-/// With s: `A = (A₀ + s/σ) e^{−σt} − s/σ`, until it is 0; with β: `A = A₀ e^{−σt} / (1 + βA₀ (1 −
-/// e^{−σt})/σ)`; limits for σ → 0.
+/// `A = A₀ e^{−σt} / (1 + βA₀ (1 − e^{−σt})/σ)`, with its limit for σ → 0.
 ///
 /// ```
 /// use torqcomp::identify::decay::envelope;
-/// // Dry friction alone: 2 − 0.5·3 = 0.5.
-/// assert_eq!(envelope(2.0, 0.0, 0.5, 0.0, 3.0), 0.5);
 /// // Drag alone: 2/(1 + 0.5·2·3) = 0.5.
-/// assert_eq!(envelope(2.0, 0.0, 0.0, 0.5, 3.0), 0.5);
+/// assert_eq!(envelope(2.0, 0.0, 0.5, 3.0), 0.5);
 /// ```
 #[must_use]
-pub fn envelope(start: f64, sigma: f64, dry: f64, quadratic: f64, time_s: f64) -> f64 {
+pub fn envelope(start: f64, sigma: f64, quadratic: f64, time_s: f64) -> f64 {
     let fall = (-sigma * time_s).exp();
     // (1 − e^{−σt})/σ, which tends to t.
     let reach = if sigma * time_s > 1e-9 {
@@ -99,13 +105,12 @@ pub fn envelope(start: f64, sigma: f64, dry: f64, quadratic: f64, time_s: f64) -
     } else {
         time_s
     };
-    let linear = start * fall / (1.0 + quadratic * start * reach) - dry * reach;
-    linear.max(0.0)
+    start * fall / (1.0 + quadratic * start * reach)
 }
 
-/// Amplitude and its derivatives by A₀, σ, s and β: with E = e^{−σt}, r = (1 − E)/σ and D = 1 + βA₀r,
-/// `E/D²`, `−tA₀E/D − A₀²Eβr'/D² − sr'`, `−r` and `−A₀²Er/D²`; r' = (tE − r)/σ, tending to −t²/2.
-fn envelope_slopes([start, sigma, dry, quadratic]: [f64; 4], time_s: f64) -> (f64, [f64; 4]) {
+/// Amplitude and its derivatives by A₀, σ and β: with E = e^{−σt}, r = (1 − E)/σ and D = 1 + βA₀r, `E/D²`,
+/// `−tA₀E/D − A₀²Eβr'/D²` and `−A₀²Er/D²`; r' = (tE − r)/σ, tending to −t²/2.
+fn envelope_slopes([start, sigma, quadratic]: [f64; 3], time_s: f64) -> (f64, [f64; 3]) {
     let fall = (-sigma * time_s).exp();
     let turn = sigma * time_s;
     let (reach, bend) = if turn > 1e-4 {
@@ -116,20 +121,22 @@ fn envelope_slopes([start, sigma, dry, quadratic]: [f64; 4], time_s: f64) -> (f6
         (reach, time_s * time_s * (turn / 3.0 - 0.5))
     };
     let below = 1.0 + quadratic * start * reach;
-    let size = start * fall / below - dry * reach;
-    if size <= 0.0 {
-        return (0.0, [0.0; 4]);
-    }
     let square = below * below;
     let slopes = [
         fall / square,
-        -time_s * start * fall / below
-            - start * start * fall * quadratic * bend / square
-            - dry * bend,
-        -reach,
+        -time_s * start * fall / below - start * start * fall * quadratic * bend / square,
         -start * start * fall * reach / square,
     ];
-    (size, slopes)
+    (start * fall / below, slopes)
+}
+
+/// A constant of a law.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct LawConstant {
+    /// Value.
+    pub value: f64,
+    /// Standard uncertainty for white noise; `null` if unknown.
+    pub std: Option<f64>,
 }
 
 /// One law fitted to the data.
@@ -141,6 +148,10 @@ pub struct LawFit {
     pub rms: f64,
     /// Bayesian information criterion, with the samples counted by the power of the noise at the mode: less is better.
     pub criterion: f64,
+    /// Damping ratio of the viscous part; `null` for laws without dry friction.
+    pub damping_ratio: Option<LawConstant>,
+    /// Dry friction, as the static signal that balances it, in the unit of the signal; `null` for laws without it.
+    pub dry_friction: Option<LawConstant>,
     /// Whether no part of the law was fitted as zero.
     #[serde(skip)]
     is_complete: bool,
@@ -159,20 +170,23 @@ pub(super) struct ViscousFit {
 
 /// Fits a law to a segment with one mode.
 fn fit(law: Law, stretch: &Stretch, viscous: &ViscousFit) -> Result<LawFit, FitError> {
+    if law.is_dry() {
+        return with_friction(law, stretch, viscous);
+    }
     let parameters = parameters(law, stretch, viscous.pole, viscous.linear);
     let residuals = |p: &[f64], out: &mut Vec<f64>| {
         let pairs = stretch.times_s.iter().zip(&stretch.values);
         out.extend(pairs.map(|(t, y)| {
-            let size = envelope(p[0], p[5], p[6], p[7], *t);
+            let size = envelope(p[0], p[5], p[6], *t);
             size * (p[1] * t + p[2]).cos() + p[3] + p[4] * t - y
         }));
         Ok(())
     };
     let jacobian = |p: &[f64], out: &mut DMatrix<f64>| {
         for (row, t) in stretch.times_s.iter().enumerate() {
-            let (size, slopes) = envelope_slopes([p[0], p[5], p[6], p[7]], *t);
+            let (size, slopes) = envelope_slopes([p[0], p[5], p[6]], *t);
             let (sin, cos) = (p[1] * t + p[2]).sin_cos();
-            let [by_start, by_sigma, by_dry, by_quadratic] = slopes.map(|s| s * cos);
+            let [by_start, by_sigma, by_quadratic] = slopes.map(|s| s * cos);
             let all = [
                 by_start,
                 -size * t * sin,
@@ -180,7 +194,6 @@ fn fit(law: Law, stretch: &Stretch, viscous: &ViscousFit) -> Result<LawFit, FitE
                 1.0,
                 *t,
                 by_sigma,
-                by_dry,
                 by_quadratic,
             ];
             for (column, value) in all.into_iter().enumerate() {
@@ -199,11 +212,34 @@ fn fit(law: Law, stretch: &Stretch, viscous: &ViscousFit) -> Result<LawFit, FitE
         ..Options::default()
     };
     let fit = minimize(&problem, &parameters, &options)?;
-    Ok(summed(law, &fit, viscous.relative_density))
+    let is_complete = !fit.at_bound[5..].iter().any(|b| *b);
+    Ok(LawFit {
+        is_complete,
+        ..summed(law, &fit, viscous.relative_density)
+    })
 }
 
-/// Amplitude, ω, phase, offset, drift, σ, s and β with their start values and bounds.
-fn parameters(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> [Parameter; 8] {
+/// Fits a law with dry friction.
+fn with_friction(law: Law, stretch: &Stretch, viscous: &ViscousFit) -> Result<LawFit, FitError> {
+    let [is_viscous, ..] = law.parts();
+    let sine = (viscous.pole, &viscous.linear[..]);
+    let fit = friction::fit(std::slice::from_ref(stretch), sine, is_viscous)?;
+    let last = fit.values.len() - 1;
+    let natural = fit.values[0].hypot(fit.values[1]);
+    let constant = |i: usize, unit: f64| LawConstant {
+        value: fit.values[i] / unit,
+        std: fit.std[i].map(|std| std / unit),
+    };
+    Ok(LawFit {
+        damping_ratio: is_viscous.then(|| constant(0, natural)),
+        dry_friction: Some(constant(last, 1.0)),
+        is_complete: !(fit.at_bound[last] || is_viscous && fit.at_bound[0]),
+        ..summed(law, &fit, viscous.relative_density)
+    })
+}
+
+/// Amplitude, ω, phase, offset, drift, σ and β with their start values and bounds, for a law without dry friction.
+fn parameters(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> [Parameter; 7] {
     let [a, b, offset, drift] = start;
     let amplitude = a.hypot(b).max(f64::MIN_POSITIVE);
     let phase = (-b).atan2(a);
@@ -219,7 +255,6 @@ fn parameters(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> [Para
         let parameter = Parameter::new(name, start).at_least(0.0).scaled(scale);
         if has { parameter } else { parameter.fixed() }
     };
-    let dry = 0.5 * share * rate * amplitude;
     let quadratic = share * rate / amplitude;
     [
         Parameter::new("amplitude", amplitude).at_least(0.0),
@@ -228,21 +263,26 @@ fn parameters(law: Law, stretch: &Stretch, pole: Pole, start: [f64; 4]) -> [Para
         Parameter::new("offset", offset).scaled(amplitude),
         Parameter::new("drift", drift).scaled(amplitude / length),
         part(parts[0], "viscous", share * rate, rate),
-        part(parts[1], "dry", dry, rate * amplitude),
         part(parts[2], "quadratic", quadratic, rate / amplitude),
     ]
 }
 
+/// Number of parameters of a law other than damping: amplitude, frequency, phase, offset and drift.
+const WITHOUT_DAMPING: usize = 5;
+
+/// The criterion of a law.
 fn summed(law: Law, fit: &Fit, relative_density: f64) -> LawFit {
     let n = fit.residuals.len() as f64;
-    let fixed = law.parts().iter().filter(|has| !**has).count();
-    let free = (fit.values.len() - fixed) as f64;
+    let parts = law.parts().iter().filter(|has| **has).count();
+    let free = (WITHOUT_DAMPING + parts) as f64;
     LawFit {
         law,
         rms: fit.rms,
         criterion: n / relative_density * fit.rms.powi(2).max(f64::MIN_POSITIVE).ln()
             + free * n.ln(),
-        is_complete: !fit.at_bound[5..8].iter().any(|b| *b),
+        damping_ratio: None,
+        dry_friction: None,
+        is_complete: true,
     }
 }
 
@@ -269,18 +309,14 @@ mod tests {
 
     #[test]
     fn slopes_are_those_of_small_changes() {
-        for p in [
-            [2.0, 30.0, 0.5, 3.0],
-            [2.0, 0.0, 0.5, 3.0],
-            [1.0, 1e-3, 0.1, 0.0],
-        ] {
+        for p in [[2.0, 30.0, 3.0], [2.0, 0.0, 3.0], [1.0, 1e-3, 0.0]] {
             let (size, slopes) = envelope_slopes(p, 0.04);
-            assert!((size - envelope(p[0], p[1], p[2], p[3], 0.04)).abs() < 1e-9);
-            for k in 0..4 {
+            assert!((size - envelope(p[0], p[1], p[2], 0.04)).abs() < 1e-9);
+            for k in 0..3 {
                 let h = 1e-6;
                 let mut there = p;
                 there[k] += h;
-                let change = envelope(there[0], there[1], there[2], there[3], 0.04) - size;
+                let change = envelope(there[0], there[1], there[2], 0.04) - size;
                 let error = (change / h - slopes[k]).abs();
                 assert!(error < 1e-5 * (1.0 + slopes[k].abs()), "{p:?} {k}: {error}");
             }

@@ -6,9 +6,11 @@ mod baseline;
 mod by_hand;
 mod dependence;
 mod first_period;
+mod friction;
 mod jumps;
 mod laws;
 mod modes;
+mod one_mode;
 mod present;
 mod restart;
 mod search;
@@ -20,7 +22,8 @@ use crate::failure::Failure;
 use crate::warning::Warning;
 
 use anew::Beginning;
-pub use laws::{Law, LawFit, envelope};
+use attempt::Attempt;
+pub use laws::{Law, LawConstant, LawFit, envelope};
 use modes::ModesFit;
 pub use modes::Stretch;
 use search::ModeSearch;
@@ -74,8 +77,19 @@ fn evaluated(
         most: MOST_MODES,
         band_hz: options.band_hz.unwrap_or((0.0, f64::INFINITY)),
     };
+    let recorded = stretches.clone();
     let found = search::search(&mut stretches, &wanted, &lines)?;
-    let (found, beginnings) = anew::cut(found, &mut stretches, (&wanted, &lines))?;
+    let (mut found, mut beginnings) = anew::cut(found, &mut stretches, (&wanted, &lines))?;
+    let is_split = found.fit.poles.len() > 1 || !beginnings.is_empty();
+    if is_split
+        && options.modes.is_none_or(|modes| modes == 1)
+        && let Some((one, moving)) =
+            one_mode::instead((&found.fit, &stretches), &recorded, &wanted)?
+    {
+        (found, beginnings) = (Attempt::with_friction(one, &wanted), Vec::new());
+        result.method.extend(present::stops(&recorded, &moving));
+        stretches = moving;
+    }
     let consequences = [stretches::OWN_PARTS, LEFT_OUT];
     let told = present::beginnings(&beginnings, consequences);
     result.warnings.extend(told);

@@ -46,6 +46,16 @@ impl Stretch {
         }
     }
 
+    /// The segment up to a time from its start.
+    pub(super) fn until(&self, time_s: f64) -> Self {
+        let start_s = self.start_s;
+        let count = self.times_s.partition_point(|t| *t <= time_s);
+        Self {
+            start_s,
+            ..self.part(0..count.max(1))
+        }
+    }
+
     /// Part of the segment.
     pub(super) fn part(&self, range: Range<usize>) -> Self {
         Self {
@@ -131,10 +141,12 @@ pub(super) struct ModesFit {
     pub colours: Vec<NoiseColour>,
     /// Frequency in Hz of a line that was rejected as too close to a mode.
     pub close_hz: Option<f64>,
+    /// Whether the last parameter of the fit is the dry friction of its only mode ([`super::friction`]).
+    pub has_friction: bool,
 }
 
 /// Number of linear parameters of a segment other than amplitudes: offset and drift.
-const TREND: usize = 2;
+pub(super) const TREND: usize = 2;
 
 /// The nonlinear fit problem.
 struct SineSum<'a> {
@@ -145,6 +157,13 @@ struct SineSum<'a> {
 impl SineSum<'_> {
     fn amplitudes_at(&self, stretch: usize) -> usize {
         2 * self.modes + stretch * (2 * self.modes + TREND)
+    }
+
+    /// All derivatives at these parameters.
+    fn derivatives(&self, p: &[f64]) -> Result<DMatrix<f64>, FitError> {
+        let rows = self.stretches.iter().map(|s| s.values.len()).sum();
+        let mut all = DMatrix::zeros(rows, p.len());
+        self.jacobian(p, &mut all).map(|()| all)
     }
 }
 
@@ -271,7 +290,8 @@ pub(super) fn fit(stretches: &[Stretch], starts: &[Pole]) -> Result<ModesFit, Fi
             ..Options::default()
         },
     )?;
-    with_colour(fit, &problem, 0)
+    let jacobian = problem.derivatives(&fit.values)?;
+    Ok(with_colour(fit, (stretches, starts.len()), (&jacobian, 0)))
 }
 
 /// The same fit with standard uncertainties of frequencies and damping that remain valid where the noise spectrum peaks
@@ -285,8 +305,13 @@ pub(super) fn with_honest_std(
     stretches: &[Stretch],
 ) -> Result<ModesFit, FitError> {
     let modes = found.poles.len();
+    if found.has_friction {
+        return Ok(found.clone());
+    }
     let problem = SineSum { stretches, modes };
-    with_colour(found.fit.clone(), &problem, 2 * modes)
+    let jacobian = problem.derivatives(&found.fit.values)?;
+    let wanted = (&jacobian, 2 * modes);
+    Ok(with_colour(found.fit.clone(), (stretches, modes), wanted))
 }
 
 /// Lowest and highest angular frequency that all segments distinguish from this one.
@@ -297,9 +322,13 @@ fn limits_rad_per_s(stretches: &[Stretch], omega: f64) -> (f64, f64) {
     })
 }
 
-/// The fit with its covariance for coloured noise.
-fn with_colour(mut fit: Fit, problem: &SineSum, wanted: usize) -> Result<ModesFit, FitError> {
-    let stretches = problem.stretches;
+/// A fit of modes with its covariance for coloured noise, from the derivatives of all parameters; see
+/// [`noise_colour::learn`] for `wanted`.
+pub(super) fn with_colour(
+    mut fit: Fit,
+    (stretches, modes): (&[Stretch], usize),
+    (jacobian, wanted): (&DMatrix<f64>, usize),
+) -> ModesFit {
     let mut residuals = Vec::new();
     let mut from = 0;
     for stretch in stretches {
@@ -308,8 +337,6 @@ fn with_colour(mut fit: Fit, problem: &SineSum, wanted: usize) -> Result<ModesFi
     }
     let count = fit.values.len();
     let free: Vec<usize> = (0..count).filter(|i| fit.std[*i].is_some()).collect();
-    let mut jacobian = DMatrix::zeros(from, count);
-    problem.jacobian(&fit.values, &mut jacobian)?;
     let groups = of_one_rate(stretches);
     let wanted = free.iter().filter(|i| **i < wanted).count();
     let learnt = noise_colour::learn(
@@ -328,13 +355,14 @@ fn with_colour(mut fit: Fit, problem: &SineSum, wanted: usize) -> Result<ModesFi
         }
         None => vec![NoiseColour::white(fit.rms.powi(2), from); stretches.len()],
     };
-    Ok(ModesFit {
-        poles: Pole::all(&fit.values[..2 * problem.modes]),
+    ModesFit {
+        poles: Pole::all(&fit.values[..2 * modes]),
         fit,
         residuals,
         colours,
         close_hz: None,
-    })
+        has_friction: false,
+    }
 }
 
 /// Relative difference below which sampling intervals are equal.

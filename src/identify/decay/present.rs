@@ -218,12 +218,33 @@ fn falls(fit: &ModesFit, stretches: &[Stretch], main: usize) -> f64 {
 }
 
 pub(super) fn method(fit: &ModesFit, stretches: usize) -> String {
+    let motion = match fit.has_friction {
+        true => "one mode with viscous damping and dry friction".to_owned(),
+        false => plural(fit.poles.len(), "decaying sine"),
+    };
     format!(
-        "nonlinear least squares: {} over {}, {} samples, each stretch with its own offset and drift",
-        plural(fit.poles.len(), "decaying sine"),
+        "nonlinear least squares: {motion} over {}, {} samples, each stretch with its own offset and drift",
         plural(stretches, "stretch"),
         fit.fit.residuals.len()
     )
+}
+
+/// Note about samples after the stop.
+pub(super) fn stops(recorded: &[Stretch], moving: &[Stretch]) -> Option<String> {
+    let end_s =
+        |stretch: &Stretch| stretch.start_s + stretch.times_s.last().copied().unwrap_or(0.0);
+    let pairs = recorded.iter().zip(moving);
+    let stopped: Vec<String> = pairs
+        .filter(|(all, moving)| end_s(moving) < end_s(all))
+        .map(|(_, moving)| rounded(end_s(moving), 5))
+        .take(NAMED)
+        .collect();
+    (!stopped.is_empty()).then(|| {
+        format!(
+            "the stand is stopped by dry friction at {} s; samples of the rest after it are excluded",
+            stopped.join(", ")
+        )
+    })
 }
 
 /// Note about a removed baseline.

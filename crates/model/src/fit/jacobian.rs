@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::problem::Evaluated;
-use super::{Differences, FitError, Parameter};
+use super::{Differences, FitError, Parameter, Residuals};
 
 /// Parameters and method of the derivatives.
 pub(super) struct Derivatives<'a> {
@@ -44,6 +44,42 @@ pub(super) fn jacobian(
         matrix.column_mut(j).copy_from_slice(&column);
     }
     finite(matrix).map(|matrix| (matrix, evaluations))
+}
+
+/// Derivatives of the residuals with respect to all parameters, fixed ones included: those of the problem, or by central
+/// differences.
+///
+/// # Errors
+/// [`FitError`] if the residuals cannot be evaluated.
+///
+/// ```
+/// use torqcomp_model::fit::{Parameter, derivatives};
+/// let residuals = |p: &[f64], out: &mut Vec<f64>| {
+///     out.push(p[0] * p[0]);
+///     Ok(())
+/// };
+/// let slopes = derivatives(&residuals, &[Parameter::new("x", 3.0)], &[3.0])?;
+/// assert!((slopes[(0, 0)] - 6.0).abs() < 1e-8);
+/// # Ok::<(), torqcomp_model::fit::FitError>(())
+/// ```
+pub fn derivatives(
+    problem: &dyn Residuals,
+    parameters: &[Parameter],
+    values: &[f64],
+) -> Result<DMatrix<f64>, FitError> {
+    let evaluated = Evaluated {
+        problem,
+        weights: None,
+        expected: None,
+    };
+    let at = evaluated.residuals(values)?;
+    let all: Vec<usize> = (0..values.len()).collect();
+    let how = Derivatives {
+        parameters,
+        free: &all,
+        differences: Differences::Central,
+    };
+    jacobian(&evaluated, &how, values, &at).map(|(matrix, _)| matrix)
 }
 
 fn finite(matrix: DMatrix<f64>) -> Result<DMatrix<f64>, FitError> {

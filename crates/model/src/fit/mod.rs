@@ -37,6 +37,7 @@ mod step;
 
 pub use covariance::Undetermined;
 pub use error::FitError;
+pub use jacobian::derivatives;
 pub use minimize::{Options, minimize};
 pub use parameter::Parameter;
 pub use problem::{Differences, Residuals, WithJacobian};

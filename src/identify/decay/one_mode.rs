@@ -1,0 +1,153 @@
+//! Whether one mode with dry friction describes decays as well as several modes, or as decays that begin anew.
+//!
+//! Dry friction widens the line of a mode and ends its decay. A sum of decaying sines follows this only with several modes
+//! about the true one, or piece by piece; [`super::friction`] does with one more parameter.
+
+use std::ops::Range;
+
+use num_complex::Complex64;
+use torqcomp_model::fit::FitError;
+
+use super::anew::AS_GOOD;
+use super::friction::{self, Motion, OF_STRETCH};
+use super::modes::{self, ModesFit, Stretch};
+use super::search::{ModeSearch, next_pole};
+use crate::identify::rms;
+
+/// Minimum share of the power explained by several modes, beyond that of one decaying sine, that dry friction explains, too.
+/// A weak second mode is not dry friction.
+const EXPLAINED: f64 = 0.95;
+/// Minimum number of samples, and of periods, of a decay up to its stop.
+const LEAST: (usize, f64) = (40, 2.0);
+/// Residual in the first half period, in standard deviations of the rest, of samples that precede the free decay: the last
+/// ones of a preload, or of the contact with the hammer.
+const NOT_FREE: f64 = 5.0;
+
+/// One mode with dry friction, and the segments up to the stop, if it describes the recorded segments as well as a fit of
+/// several modes or of later parts.
+///
+/// # Errors
+/// [`FitError`] if there are too few samples.
+pub(super) fn instead(
+    (found, kept): (&ModesFit, &[Stretch]),
+    recorded: &[Stretch],
+    wanted: &ModeSearch,
+) -> Result<Option<(ModesFit, Vec<Stretch>)>, FitError> {
+    if recorded.iter().any(|stretch| !stretch.bands_hz.is_empty()) {
+        return Ok(None);
+    }
+    let Some(pole) = next_pole(recorded, &modes::fit(recorded, &[])?, wanted.band_hz) else {
+        return Ok(None);
+    };
+    let sine = modes::fit(recorded, &[pole])?;
+    // Too few samples in a time constant of the sine: no friction can be told from it.
+    let Ok(first) = friction::fit(recorded, (sine.poles[0], &sine.fit.values[2..]), true) else {
+        return Ok(None);
+    };
+    let Some(moving) = moving(recorded, &first.values) else {
+        return Ok(None);
+    };
+    let mut one = friction::continued(&moving, &first.values)?;
+    let free = free(&moving, &one);
+    if free != moving {
+        one = friction::continued(&free, &later(&one, (&moving, &free)))?;
+    }
+    let sine = modes::fit(&free, &sine.poles)?;
+    let several = while_moving((found, kept), &free);
+    let is_as_good = one.fit.rms < AS_GOOD * several;
+    let explained = sine.fit.rms.powi(2) - one.fit.rms.powi(2);
+    let explains = explained > EXPLAINED * (sine.fit.rms.powi(2) - several.powi(2));
+    let is_dry = one
+        .fit
+        .values
+        .last()
+        .is_some_and(|friction| *friction > 0.0);
+    let is_better = is_dry && is_as_good && explains && rests(recorded, &one, &free)?;
+    Ok(is_better.then_some((one, free)))
+}
+
+/// The segments up to the stop; `None` if one is too short.
+fn moving(stretches: &[Stretch], parameters: &[f64]) -> Option<Vec<Stretch>> {
+    let until_stop = |(s, stretch): (usize, &Stretch)| {
+        let end_s = stretch.times_s.last()?;
+        let stop_s = Motion::of(parameters, s).stop_s(*end_s).unwrap_or(*end_s);
+        let part = stretch.until(stop_s);
+        let periods = stop_s * parameters[1] / std::f64::consts::TAU;
+        (part.values.len() >= LEAST.0 && periods >= LEAST.1).then_some(part)
+    };
+    stretches.iter().enumerate().map(until_stop).collect()
+}
+
+/// The segments without first samples that do not belong to the free decay.
+fn free(moving: &[Stretch], one: &ModesFit) -> Vec<Stretch> {
+    let half_s = std::f64::consts::PI / one.poles[0].omega_rad_per_s;
+    let of_each = |(stretch, residuals): (&Stretch, &Vec<f64>)| {
+        let half = stretch.times_s.partition_point(|t| *t < half_s);
+        let (first, rest) = residuals.split_at(half);
+        let least = NOT_FREE * rms(rest);
+        let last = first.iter().rposition(|residual| residual.abs() > least);
+        last.map_or_else(|| stretch.clone(), |last| stretch.later(last + 1))
+    };
+    moving.iter().zip(&one.residuals).map(of_each).collect()
+}
+
+/// The parameters of a fit, with the displacement and quadrature at the start of later segments.
+fn later(one: &ModesFit, (before, after): (&[Stretch], &[Stretch])) -> Vec<f64> {
+    let mut values = one.fit.values.clone();
+    let pole = one.poles[0];
+    let of_each = values[2..]
+        .chunks_exact_mut(OF_STRETCH)
+        .zip(before.iter().zip(after));
+    for (own, (before, after)) in of_each {
+        let passed_s = after.start_s - before.start_s;
+        let turn = Complex64::new(-pole.rate_per_s, pole.omega_rad_per_s) * passed_s;
+        let phasor = Complex64::new(own[0], -own[1]) * turn.exp();
+        (own[0], own[1]) = (phasor.re, -phasor.im);
+    }
+    values
+}
+
+/// Rms residual of a fit at the times of these segments; of all if it has none of them.
+fn while_moving((found, kept): (&ModesFit, &[Stretch]), moving: &[Stretch]) -> f64 {
+    let times = |stretch: &Stretch| -> Range<f64> {
+        stretch.start_s..stretch.start_s + stretch.times_s.last().copied().unwrap_or(0.0)
+    };
+    let moves = |time_s: f64| {
+        moving
+            .iter()
+            .any(|stretch| times(stretch).contains(&time_s))
+    };
+    let pairs = kept.iter().zip(&found.residuals);
+    let within = pairs.flat_map(|(stretch, residuals)| {
+        let pairs = stretch.times_s.iter().zip(residuals);
+        pairs
+            .filter(|(t, _)| moves(stretch.start_s + **t))
+            .map(|(_, residual)| *residual)
+    });
+    let within: Vec<f64> = within.collect();
+    match within.len() < LEAST.0 {
+        true => found.fit.rms,
+        false => rms(&within),
+    }
+}
+
+/// Whether the stand no longer swings by more than the friction after the stop.
+///
+/// # Errors
+/// [`FitError`] if the rest has too few samples.
+fn rests(recorded: &[Stretch], one: &ModesFit, moving: &[Stretch]) -> Result<bool, FitError> {
+    let friction = one.fit.values.last().copied().unwrap_or(0.0);
+    let reach = (AS_GOOD * one.fit.rms).hypot(friction);
+    for (recorded, moving) in recorded.iter().zip(moving) {
+        let stop_s = moving.start_s + moving.times_s.last().copied().unwrap_or(0.0);
+        let stop = recorded
+            .times_s
+            .partition_point(|t| recorded.start_s + t <= stop_s);
+        let after = stop..recorded.values.len();
+        // About offset and drift of its own.
+        if after.len() >= LEAST.0 && modes::fit(&[recorded.part(after)], &[])?.fit.rms > reach {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
