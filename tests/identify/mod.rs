@@ -3,6 +3,7 @@
 
 mod beginnings;
 mod decay;
+mod dry_friction;
 mod files;
 mod late_channels;
 mod response;

@@ -12,7 +12,7 @@ use super::anew::AS_GOOD;
 use super::friction::{self, Motion, OF_STRETCH};
 use super::modes::{self, ModesFit, Stretch};
 use super::search::{ModeSearch, next_pole};
-use crate::identify::rms;
+use crate::identify::{Pole, rms};
 
 /// Minimum share of the power explained by several modes, beyond that of one decaying sine, that dry friction explains, too.
 /// A weak second mode is not dry friction.
@@ -23,25 +23,55 @@ const LEAST: (usize, f64) = (40, 2.0);
 /// ones of a preload, or of the contact with the hammer.
 const NOT_FREE: f64 = 5.0;
 
-/// One mode with dry friction, and the segments up to the stop, if it describes the recorded segments as well as a fit of
-/// several modes or of later parts.
+/// Number of periods after which a segment is tried to begin: samples of a preload before its release are not those of a free
+/// decay.
+const LATER: [f64; 2] = [0.0, 1.0];
+
+/// One mode with dry friction, and the segments up to the stop.
+type Moving = (ModesFit, Vec<Stretch>);
+
+/// One mode with dry friction, if it describes the recorded segments as well as a fit of several modes or of later parts.
 ///
 /// # Errors
 /// [`FitError`] if there are too few samples.
 pub(super) fn instead(
-    (found, kept): (&ModesFit, &[Stretch]),
+    several: (&ModesFit, &[Stretch]),
     recorded: &[Stretch],
     wanted: &ModeSearch,
-) -> Result<Option<(ModesFit, Vec<Stretch>)>, FitError> {
+) -> Result<Option<Moving>, FitError> {
     if recorded.iter().any(|stretch| !stretch.bands_hz.is_empty()) {
         return Ok(None);
     }
-    let Some(pole) = next_pole(recorded, &modes::fit(recorded, &[])?, wanted.band_hz) else {
+    let Some(line) = next_pole(recorded, &modes::fit(recorded, &[])?, wanted.band_hz) else {
         return Ok(None);
     };
-    let sine = modes::fit(recorded, &[pole])?;
-    // Too few samples in a time constant of the sine: no friction can be told from it.
-    let Ok(first) = friction::fit(recorded, (sine.poles[0], &sine.fit.values[2..]), true) else {
+    for periods in LATER {
+        let lead_s = periods / line.frequency_hz();
+        let first = |stretch: &Stretch| stretch.times_s.partition_point(|t| *t < lead_s);
+        if recorded.iter().any(|s| first(s) + LEAST.0 > s.values.len()) {
+            break;
+        }
+        let later: Vec<Stretch> = recorded.iter().map(|s| s.later(first(s))).collect();
+        let found = of_friction(&later, line)?;
+        if let Some((one, free, sine)) = found
+            && is_as_good(&one, &sine, while_moving(several, &free))
+            && rests(recorded, &one, &free)?
+        {
+            return Ok(Some((one, free)));
+        }
+    }
+    Ok(None)
+}
+
+/// One mode with dry friction, its segments, and a decaying sine fitted to these, near a line; `None` if there are too few
+/// samples.
+fn of_friction(
+    recorded: &[Stretch],
+    line: Pole,
+) -> Result<Option<(ModesFit, Vec<Stretch>, ModesFit)>, FitError> {
+    let sine = modes::fit(recorded, &[line])?;
+    let start = (sine.poles[0], &sine.fit.values[2..]);
+    let Ok(first) = friction::fit(recorded, start, true) else {
         return Ok(None);
     };
     let Some(moving) = moving(recorded, &first.values) else {
@@ -53,17 +83,19 @@ pub(super) fn instead(
         one = friction::continued(&free, &later(&one, (&moving, &free)))?;
     }
     let sine = modes::fit(&free, &sine.poles)?;
-    let several = while_moving((found, kept), &free);
-    let is_as_good = one.fit.rms < AS_GOOD * several;
+    Ok(Some((one, free, sine)))
+}
+
+/// Whether dry friction explains as much as several modes with this residual.
+fn is_as_good(one: &ModesFit, sine: &ModesFit, several: f64) -> bool {
     let explained = sine.fit.rms.powi(2) - one.fit.rms.powi(2);
-    let explains = explained > EXPLAINED * (sine.fit.rms.powi(2) - several.powi(2));
+    let by_several = sine.fit.rms.powi(2) - several.powi(2);
     let is_dry = one
         .fit
         .values
         .last()
         .is_some_and(|friction| *friction > 0.0);
-    let is_better = is_dry && is_as_good && explains && rests(recorded, &one, &free)?;
-    Ok(is_better.then_some((one, free)))
+    is_dry && one.fit.rms < AS_GOOD * several && explained > EXPLAINED * by_several
 }
 
 /// The segments up to the stop; `None` if one is too short.

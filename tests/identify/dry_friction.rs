@@ -1,0 +1,126 @@
+//! Decays of stands with viscous damping and dry friction, which stop at a displaced zero.
+
+use torqcomp::identify::{Identification, decay};
+
+use super::{Noise, TAU, of, times};
+
+const RATE_HZ: f64 = 5000.0;
+const NATURAL_HZ: f64 = 180.0;
+const DAMPING_RATIO: f64 = 0.015;
+/// Steps per sample.
+const STEPS: u32 = 400;
+
+/// 0.6 s of a stand's motion by small steps, held at 1 until a moment and released then, with dry friction as the displacement
+/// that balances it. Where the speed changes sign within the friction, the stand sticks.
+fn released(friction: f64, at_s: f64) -> Vec<f64> {
+    let (omega, step_s) = (TAU * NATURAL_HZ, 1.0 / (RATE_HZ * f64::from(STEPS)));
+    let (mut x, mut speed, mut sticks) = (1.0_f64, 0.0_f64, false);
+    let mut record = Vec::new();
+    for k in 0..3000 * STEPS {
+        if k % STEPS == 0 {
+            record.push(x);
+        }
+        if sticks || f64::from(k) * step_s < at_s {
+            continue;
+        }
+        let way = if speed == 0.0 {
+            -x.signum()
+        } else {
+            speed.signum()
+        };
+        let torque = -omega * omega * (x + friction * way) - 2.0 * DAMPING_RATIO * omega * speed;
+        let next = speed + step_s * torque;
+        if next * speed < 0.0 {
+            sticks = x.abs() <= friction;
+            speed = 0.0;
+            continue;
+        }
+        speed = next;
+        x += step_s * speed;
+    }
+    record
+}
+
+fn identified(mut record: Vec<f64>, noise: &mut Noise, modes: Option<usize>) -> Identification {
+    record
+        .iter_mut()
+        .for_each(|x| *x += 0.3 + 1e-3 * noise.normal());
+    let ringing = decay::Ringing {
+        name: "simulated",
+        times_s: &times(record.len(), RATE_HZ),
+        rate_hz: Some(RATE_HZ),
+        values: &record,
+    };
+    let options = decay::DecayOptions {
+        modes,
+        ..decay::DecayOptions::default()
+    };
+    decay::identify(&[ringing], &options).unwrap().0
+}
+
+/// Several modes, a restart at the stop, or a part that is driven.
+const FALSE: [&str; 5] = [
+    "driven-at-first",
+    "restart-in-decay",
+    "mains-taken-off",
+    "tone-taken-off",
+    "poor-fit",
+];
+
+#[test]
+fn dry_friction_is_neither_several_modes_nor_a_restart() {
+    let mut noise = Noise(15);
+    // The last three begin within a period of a preload.
+    for (friction, at_s, modes) in [
+        (0.005, 0.0833, None),
+        (0.01, 0.0833, None),
+        (0.02, 0.0833, Some(1)),
+        (0.05, 0.0833, None),
+        (0.01, 0.0006, None),
+        (0.02, 0.0012, None),
+        (0.05, 0.0006, None),
+    ] {
+        let found = identified(released(friction, at_s), &mut noise, modes);
+        let told: Vec<&str> = found.warnings.iter().map(|w| w.code).collect();
+        let what = format!("{friction} after {at_s} s: {told:?}");
+        assert_eq!(found.modes.len(), 1, "{what}");
+        let frequency_hz = of(&found, "natural_frequency").value();
+        assert!(
+            (frequency_hz / NATURAL_HZ - 1.0).abs() < 1e-3,
+            "{what}: {frequency_hz}"
+        );
+        assert!(told.contains(&"not-viscous"), "{what}");
+        assert!(!told.iter().any(|code| FALSE.contains(code)), "{what}");
+        let best = &found.laws[0];
+        assert_eq!(best.law, decay::Law::ViscousAndDry, "{what}");
+        let constants = [
+            (best.damping_ratio, DAMPING_RATIO),
+            (best.dry_friction, friction),
+        ];
+        for (constant, truth) in constants {
+            let value = constant.unwrap().value;
+            assert!(
+                (value / truth - 1.0).abs() < 0.05,
+                "{what}: {value} for {truth}"
+            );
+        }
+    }
+}
+
+/// A weak second mode is not friction, nor is the beat of two modes a stop.
+#[test]
+fn two_modes_are_no_dry_friction() {
+    let mut noise = Noise(16);
+    for (size, hz) in [(0.02, 250.0), (0.2, 210.0), (0.9, 196.0)] {
+        let mode = |t: f64, hz: f64| (-0.015 * TAU * hz * t).exp() * (TAU * hz * t).cos();
+        let t = times(3000, RATE_HZ);
+        let record = t.iter().map(|t| mode(*t, NATURAL_HZ) + size * mode(*t, hz));
+        let found = identified(record.collect(), &mut noise, None);
+        assert_eq!(
+            found.modes.len(),
+            2,
+            "{size} at {hz} Hz: {:?}",
+            found.warnings
+        );
+    }
+}
