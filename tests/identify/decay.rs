@@ -254,14 +254,25 @@ fn the_law_of_damping_is_told() {
     let mut noise = Noise(14);
     let rate_hz = 10_000.0;
     let t = times(4000, rate_hz);
-    let mut law = |envelope: &dyn Fn(f64) -> f64| {
-        let y: Vec<f64> = t
-            .iter()
-            .map(|t| envelope(*t) * (TAU * 130.0 * t).cos() + 2e-3 * noise.normal())
-            .collect();
-        ring(&t, &y, rate_hz).0
+    let mut of_motion = |motion: &dyn Fn(f64) -> f64| {
+        let y = t.iter().map(|t| motion(*t) + 2e-3 * noise.normal());
+        ring(&t, &y.collect::<Vec<_>>(), rate_hz).0
     };
-    let dry = law(&|t| (1.0 - 3.0 * t).max(0.0));
+    // Half cycles about ±F, each 2F smaller than the one before, until the stand sticks: a fall of 3/s.
+    let friction: f64 = 3.0 / (4.0 * 130.0);
+    let stop = ((1.0 - friction) / (2.0 * friction)).ceil();
+    let dry = of_motion(&|t| {
+        let half = (2.0 * 130.0 * t).floor().min(stop);
+        let side = if half % 2.0 == 0.0 { 1.0 } else { -1.0 };
+        match half < stop {
+            true => {
+                (1.0 - (2.0 * half + 1.0) * friction) * (TAU * 130.0 * t).cos() + side * friction
+            }
+            false => side * (1.0 - 2.0 * stop * friction),
+        }
+    });
+    let mut law =
+        |envelope: &dyn Fn(f64) -> f64| of_motion(&|t| envelope(t) * (TAU * 130.0 * t).cos());
     assert_eq!(dry.laws[0].law, decay::Law::Dry);
     assert!(dry.warnings.iter().any(|w| w.code == "not-viscous"));
     let drag = law(&|t| 1.0 / (1.0 + 20.0 * t));

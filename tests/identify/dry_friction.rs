@@ -41,7 +41,7 @@ fn released(friction: f64, at_s: f64) -> Vec<f64> {
     record
 }
 
-fn identified(mut record: Vec<f64>, noise: &mut Noise, modes: Option<usize>) -> Identification {
+fn identified(mut record: Vec<f64>, noise: &mut Noise) -> Identification {
     record
         .iter_mut()
         .for_each(|x| *x += 0.3 + 1e-3 * noise.normal());
@@ -51,11 +51,9 @@ fn identified(mut record: Vec<f64>, noise: &mut Noise, modes: Option<usize>) -> 
         rate_hz: Some(RATE_HZ),
         values: &record,
     };
-    let options = decay::DecayOptions {
-        modes,
-        ..decay::DecayOptions::default()
-    };
-    decay::identify(&[ringing], &options).unwrap().0
+    decay::identify(&[ringing], &decay::DecayOptions::default())
+        .unwrap()
+        .0
 }
 
 /// Several modes, a restart at the stop, or a part that is driven.
@@ -71,16 +69,16 @@ const FALSE: [&str; 5] = [
 fn dry_friction_is_neither_several_modes_nor_a_restart() {
     let mut noise = Noise(15);
     // The last three begin within a period of a preload.
-    for (friction, at_s, modes) in [
-        (0.005, 0.0833, None),
-        (0.01, 0.0833, None),
-        (0.02, 0.0833, Some(1)),
-        (0.05, 0.0833, None),
-        (0.01, 0.0006, None),
-        (0.02, 0.0012, None),
-        (0.05, 0.0006, None),
+    for (friction, at_s) in [
+        (0.005, 0.0833),
+        (0.01, 0.0833),
+        (0.02, 0.0833),
+        (0.05, 0.0833),
+        (0.01, 0.0006),
+        (0.02, 0.0012),
+        (0.05, 0.0006),
     ] {
-        let found = identified(released(friction, at_s), &mut noise, modes);
+        let found = identified(released(friction, at_s), &mut noise);
         let told: Vec<&str> = found.warnings.iter().map(|w| w.code).collect();
         let what = format!("{friction} after {at_s} s: {told:?}");
         assert_eq!(found.modes.len(), 1, "{what}");
@@ -115,7 +113,7 @@ fn two_modes_are_no_dry_friction() {
         let mode = |t: f64, hz: f64| (-0.015 * TAU * hz * t).exp() * (TAU * hz * t).cos();
         let t = times(3000, RATE_HZ);
         let record = t.iter().map(|t| mode(*t, NATURAL_HZ) + size * mode(*t, hz));
-        let found = identified(record.collect(), &mut noise, None);
+        let found = identified(record.collect(), &mut noise);
         assert_eq!(
             found.modes.len(),
             2,
