@@ -8,6 +8,9 @@ use crate::print::rounded;
 
 /// Minimum reduction of the criterion for a law other than viscous damping.
 const CLEARLY: f64 = 10.0;
+/// Residual of a law relative to that of viscous damping, below which that of viscous damping is not noise, whose colour
+/// would otherwise count: most of it is damping.
+const MUCH_LESS: f64 = 0.5;
 
 /// Minimum relative reduction of the residual, in addition.
 const WORTHWHILE: f64 = 0.01;
@@ -43,7 +46,7 @@ pub(super) fn damping_law(
     let viscous = laws.iter().find(|l| l.law == Law::Viscous);
     if let (Some(best), Some(viscous)) = (laws.first(), viscous)
         && best.law != Law::Viscous
-        && best.criterion < viscous.criterion - CLEARLY
+        && (best.criterion < viscous.criterion - CLEARLY || best.rms < MUCH_LESS * viscous.rms)
         && best.rms < (1.0 - WORTHWHILE) * viscous.rms
     {
         let part = match fit.has_friction {
