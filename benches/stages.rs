@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use num_complex::Complex64;
+use torqcomp::digits::{self, Digits};
 use torqcomp::io::Reading;
-use torqcomp::io::digits::{self, Digits};
 use torqcomp::recording::text::{ChannelRows, StampUse, TextFile};
 use torqcomp_dsp::band::Band;
 use torqcomp_dsp::bridge::{ArmLaw, Bridge, BridgeLayout, Supply};

@@ -17,9 +17,9 @@ use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use torqcomp_model::UnitSystem;
 
+use crate::digits::Digits;
 use crate::failure::Failure;
 use crate::file_name;
-use crate::io::digits::Digits;
 use crate::io::output::{Output, Policy};
 use crate::io::{ChannelChoice, Reading, frequency, positive_frequency};
 

@@ -5,6 +5,7 @@ mod chart;
 mod cli;
 mod commands;
 mod diagnose;
+pub mod digits;
 #[cfg(test)]
 mod docs_tests;
 pub mod failure;

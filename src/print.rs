@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use unicode_width::UnicodeWidthStr;
 
-use crate::io::digits;
+use crate::digits;
 
 /// A JSON document, indented, with a line end.
 ///

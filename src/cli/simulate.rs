@@ -6,8 +6,8 @@ use clap::{Args, ValueEnum};
 use torqcomp_model::simulate;
 
 use super::{BatchOptions, OutputArgs, Strictness, digits};
+use crate::digits::Digits;
 use crate::io::Reading;
-use crate::io::digits::Digits;
 
 /// Arguments of `simulate`.
 #[derive(Debug, Clone, Args)]

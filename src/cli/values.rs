@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use crate::digits::Digits;
 use crate::failure::did_you_mean;
 use crate::file_name::{self, ShowPath, is_dash};
-use crate::io::digits::Digits;
 use crate::io::positive_frequency;
 use crate::warning::CODES;
 

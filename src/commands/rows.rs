@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
+use crate::digits::{self, Decimal, Digits};
 use crate::failure::Failure;
-use crate::io::digits::{self, Decimal, Digits};
 use crate::io::output::Output;
 use crate::io::text::Text;
 use crate::recording::moment::Moment;

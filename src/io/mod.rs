@@ -1,6 +1,5 @@
 //! Files in and out.
 
-pub mod digits;
 mod fault;
 mod input;
 pub(crate) mod json_lines;

@@ -1,6 +1,6 @@
 //! Text assembled from many short pieces.
 
-use super::digits::{self, Decimal, Digits};
+use crate::digits::{self, Decimal, Digits};
 
 /// Longest piece copied with a fixed length.
 const SHORT: usize = 32;

@@ -8,7 +8,7 @@ use torqcomp_dsp::quality::rounding::{Rounded, uniform_line};
 use super::Hole;
 use super::moment::Moment;
 use super::stamps::StampGrid;
-use crate::io::digits;
+use crate::digits;
 
 /// Largest relative deviation of a step from the typical one in a record with a rate.
 const USUAL: f64 = 0.25;

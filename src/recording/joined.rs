@@ -5,7 +5,8 @@ use torqcomp_dsp::quality::broken_line::BrokenLine;
 use super::axis::{SampleStep, rounding, step_of};
 use super::stamps::{IrregularStep, StampGrid, first_missing, is_gap};
 use super::{Channel, RateFrom, TimeAxis};
-use crate::io::{Reading, digits};
+use crate::digits;
+use crate::io::Reading;
 use crate::print::plural;
 use crate::warning::Warning;
 

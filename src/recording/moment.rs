@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::io::digits;
+use crate::digits;
 
 /// Nanoseconds of a second.
 const SECOND: i64 = 1_000_000_000;

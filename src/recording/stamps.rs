@@ -8,8 +8,9 @@ use super::axis::{
 };
 use super::checkpoints::sharpened;
 use super::moment::Moment;
+use crate::digits;
 use crate::failure::{ErrorCode, Failure};
-use crate::io::{Reading, digits};
+use crate::io::Reading;
 use crate::print::plural;
 use crate::warning::Warning;
 

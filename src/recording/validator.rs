@@ -317,8 +317,8 @@ impl StreamValidator {
                     "{}: the rate of the first rows is {} Hz, that of the whole record {} Hz on average; the rate of \
                      the first rows was used",
                     self.source,
-                    crate::io::digits::text(rate_hz, 7),
-                    crate::io::digits::text(rate_hz * samples / steps, 7)
+                    crate::digits::text(rate_hz, 7),
+                    crate::digits::text(rate_hz * samples / steps, 7)
                 ),
             ));
         }

@@ -415,7 +415,7 @@ fn no_torque(channel: &str, named: &NamedUnit) -> Failure {
         let torque = size.map_or_else(
             |_| format!("as a force, write --unit \"{force}\""),
             |size| {
-                let size = crate::io::digits::text(size, 5);
+                let size = crate::digits::text(size, 5);
                 format!("if it is a torque, give --unit \"{force}\" (1 {force} = {size} N m)")
             },
         );

@@ -6,8 +6,8 @@ use torqcomp_model::Estimate;
 
 use super::update::{COMMON, CORRELATIONS, MODES};
 use super::{Given, MODE_CORRELATIONS, Stand};
+use crate::digits;
 use crate::failure::{ErrorCode, Failure};
-use crate::io::digits;
 use crate::print::unit_of_quotient;
 
 /// A parameter of an effect as written: name, value, and standard uncertainty.

@@ -148,7 +148,7 @@ impl TransducerSignal {
     #[must_use]
     pub fn text(self, value: f64) -> String {
         let (unit, factor) = self.usual_unit();
-        format!("{} {unit}", crate::io::digits::text(value / factor, 9))
+        format!("{} {unit}", crate::digits::text(value / factor, 9))
     }
 
     /// A quantity of a stand file whose unit determines its signal.

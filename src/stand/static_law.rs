@@ -298,7 +298,7 @@ impl Stand {
         Ok(StaticLaw {
             described: format!(
                 "from drawing, gage and bridge: {} {}{of_signal} for small signals",
-                crate::io::digits::text(small, 5),
+                crate::digits::text(small, 5),
                 Kind::Torque.unit(units)
             ),
             std: ConstantStd::of(self.of_drawing(signal)),

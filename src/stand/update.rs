@@ -62,7 +62,7 @@ impl Entry {
     /// A bare number with three digits.
     #[must_use]
     pub fn number(section: &'static str, key: &'static str, number: f64) -> Self {
-        Self::text(section, key, &crate::io::digits::text(number, 3))
+        Self::text(section, key, &crate::digits::text(number, 3))
     }
 
     /// A text.
@@ -350,7 +350,7 @@ fn put(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<(), Fail
 
 /// Nine significant digits, more than any record can determine.
 fn number_text(number: f64) -> String {
-    crate::io::digits::text(number, 9)
+    crate::digits::text(number, 9)
 }
 
 /// Whether a stand file defines the conversion of its record to torque.

@@ -220,7 +220,7 @@ fn provenance(
     report: &CompensateReport,
 ) -> Result<BTreeMap<String, String>, Failure> {
     let (_, stand) = stand::text(&args.stand)?;
-    let number = |value: f64| crate::io::digits::text(value, 12);
+    let number = |value: f64| crate::digits::text(value, 12);
     let pairs = [
         (
             "tool",

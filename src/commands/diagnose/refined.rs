@@ -6,9 +6,9 @@ use torqcomp_model::effects::Unit;
 use crate::diagnose::{
     Diagnosis, EffectForm, EffectParameter, HeldBody, RecordResidual, ScoredModel,
 };
+use crate::digits;
 use crate::failure::Failure;
 use crate::identify::MODE_NUMBERS;
-use crate::io::digits;
 use crate::stand::{self, Refined, Stand};
 
 /// The refined stand file.

@@ -35,7 +35,7 @@ const LEAST_RATE: f64 = 1e-6;
 
 /// The motion of a mode.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Motion {
+pub(super) struct SlidingMotion {
     pole: Pole,
     /// F, in the unit of the samples.
     friction: f64,
@@ -43,7 +43,7 @@ pub(super) struct Motion {
     start: [f64; 2],
 }
 
-/// Motion between two turning points: `c + e^{−σu} (p cos ωu + q sin ωu)`, u from its start.
+/// The motion between two turning points: `c + e^{−σu} (p cos ωu + q sin ωu)`, u from its start.
 #[derive(Debug, Clone, Copy)]
 struct HalfCycle {
     from_s: f64,
@@ -52,7 +52,7 @@ struct HalfCycle {
     sine: [f64; 2],
 }
 
-impl Motion {
+impl SlidingMotion {
     /// The motion of a segment by the parameters σ, ω, those of each segment, and F.
     pub fn of(parameters: &[f64], stretch: usize) -> Self {
         let own = &parameters[2 + OF_STRETCH * stretch..];
@@ -135,7 +135,7 @@ impl Motion {
 }
 
 /// Fits the motion to segments, from a decaying sine fitted to them: its pole, and a, b, offset and drift of each segment.
-/// Parameters as for [`Motion::of`].
+/// Parameters as for [`SlidingMotion::of`].
 ///
 /// # Errors
 /// [`FitError`] if there are too few samples.
@@ -171,7 +171,7 @@ fn residuals(stretches: &[Stretch]) -> impl Fn(&[f64], &mut Vec<f64>) -> Result<
             let samples = stretch.times_s.iter().zip(&stretch.values);
             out.extend(samples.map(|(t, y)| offset + drift * t - y));
             let out = &mut out[from..];
-            Motion::of(p, s).at(&stretch.times_s, |i, x| out[i] += x);
+            SlidingMotion::of(p, s).at(&stretch.times_s, |i, x| out[i] += x);
         }
         Ok(())
     }

@@ -103,6 +103,24 @@ fn evaluated(
     present::fit_warnings(&mut result, &fit);
     let reported = modes::with_honest_std(&fit, &stretches)?;
     let order = fit.by_strength(stretches.len());
+    tell_modes(&mut result, &fit, &reported, &order);
+    result.fit = Some(quality(&fit, &stretches));
+    result.method.push(present::method(&fit, stretches.len()));
+    if has_baseline {
+        result.method.push(present::BASELINE.to_owned());
+    }
+    present::correlations(&mut result, &reported);
+    dependence::damping_law(&mut result, &fit, &stretches)?;
+    dependence::amplitude_dependence(&mut result, &fit, &stretches, order[0]);
+    present::apart(&mut result, &fit, stretches.len());
+    present::poor(&mut result, &fit, &stretches, (order[0], has_baseline));
+    by_hand::compare(&mut result, &fit, &stretches, order[0]);
+    present::draw(&mut result, &fit, &stretches);
+    Ok((result, stretches, beginnings))
+}
+
+/// Adds the modes, the strongest first, with their constants.
+fn tell_modes(result: &mut Identification, fit: &ModesFit, reported: &ModesFit, order: &[usize]) {
     for (place, k) in order.iter().enumerate() {
         let mode = ModalPole::new(
             fit.poles[*k],
@@ -118,19 +136,6 @@ fn evaluated(
         result.parameters.extend(constants.list);
         result.modes.push(mode);
     }
-    result.fit = Some(quality(&fit, &stretches));
-    result.method.push(present::method(&fit, stretches.len()));
-    if has_baseline {
-        result.method.push(present::BASELINE.to_owned());
-    }
-    present::correlations(&mut result, &reported);
-    dependence::damping_law(&mut result, &fit, &stretches)?;
-    dependence::amplitude_dependence(&mut result, &fit, &stretches, order[0]);
-    present::apart(&mut result, &fit, stretches.len());
-    present::poor(&mut result, &fit, &stretches, (order[0], has_baseline));
-    by_hand::compare(&mut result, &fit, &stretches, order[0]);
-    present::draw(&mut result, &fit, &stretches);
-    Ok((result, stretches, beginnings))
 }
 
 /// Warns about a record that is not a single free decay after each hit.

@@ -9,7 +9,7 @@ use num_complex::Complex64;
 use torqcomp_model::fit::FitError;
 
 use super::anew::AS_GOOD;
-use super::friction::{self, Motion, OF_STRETCH};
+use super::friction::{self, OF_STRETCH, SlidingMotion};
 use super::modes::{self, ModesFit, Stretch};
 use super::search::{ModeSearch, next_pole};
 use crate::identify::{Pole, rms};
@@ -102,7 +102,9 @@ fn is_as_good(one: &ModesFit, sine: &ModesFit, several: f64) -> bool {
 fn moving(stretches: &[Stretch], parameters: &[f64]) -> Option<Vec<Stretch>> {
     let until_stop = |(s, stretch): (usize, &Stretch)| {
         let end_s = stretch.times_s.last()?;
-        let stop_s = Motion::of(parameters, s).stop_s(*end_s).unwrap_or(*end_s);
+        let stop_s = SlidingMotion::of(parameters, s)
+            .stop_s(*end_s)
+            .unwrap_or(*end_s);
         let part = stretch.until(stop_s);
         let periods = stop_s * parameters[1] / std::f64::consts::TAU;
         (part.values.len() >= LEAST.0 && periods >= LEAST.1).then_some(part)

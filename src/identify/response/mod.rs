@@ -122,7 +122,8 @@ pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identif
     };
     let of = (&set, &lines);
     let fitted = final_fit(whole, of, options, (&data, &coarse), &mut result)?;
-    if order::is_unexplained(&held_out) && !(fitted.relative < check::POOR) {
+    let is_poor = fitted.relative.is_nan() || fitted.relative >= check::POOR;
+    if order::is_unexplained(&held_out) && is_poor {
         return Err(order::unexplained());
     }
     let options = &options.with_delay_of(Some(&fitted.modal));

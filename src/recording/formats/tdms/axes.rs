@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use super::objects::{Properties, Property, TdmsObject, TdmsObjects};
 use super::scales;
+use crate::digits;
 use crate::failure::{ErrorCode, Failure};
-use crate::io::{Reading, digits};
+use crate::io::Reading;
 use crate::recording::formats::{Content, NAMED, channel, names_left_out, plausible_rate, stamped};
 use crate::recording::moment::{Moment, date_and_time};
 use crate::recording::text::is_time_name;
