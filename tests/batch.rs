@@ -183,7 +183,7 @@ fn a_bad_recording_stops_no_other() {
             "failed: logs/b.csv, line 5002",
             "failed: logs/empty.csv",
             "2 of 6 recordings failed; the others are done",
-            "skipped: logs/README.md",
+            "skipped, not recordings judging by their content: logs/README.md",
         ],
     );
     assert_eq!(results(&folder).keys().collect::<Vec<_>>(), RESULTS);

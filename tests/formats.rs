@@ -484,5 +484,5 @@ fn files_of_other_programs_are_refused_with_the_way_to_convert_them() {
     folder.write("logs/b.uff", data_set(4, true, None, &signal(50)));
     folder
         .run(&["inspect", "logs", "-o", "out/"])
-        .says(0, &["2 done", "skipped: logs/bag.db3"]);
+        .says(0, &["2 done", "judging by their content: logs/bag.db3"]);
 }

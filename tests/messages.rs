@@ -249,7 +249,7 @@ fn diagnose_brings_topics_with_other_stamps_together_and_says_so() {
             "--measured",
             "/y.v",
         ])
-        .says(1, &["\"/y.v\" has 125 Hz", "one time axis"]);
+        .says(1, &["\"/y.v\" is sampled at 125 Hz", "one time axis"]);
 }
 
 #[test]

@@ -14,8 +14,8 @@ const WIDTH: f64 = 0.5;
 
 impl ScoredModel {
     /// Replaces the standard uncertainties by ones that allow for the colour of the training residuals, which noise on
-    /// the applied quantity acquires from the stand; `records` have the weights of the fit. Those for white noise remain where the derivatives are
-    /// unavailable.
+    /// the applied quantity acquires from the stand; `records` have the weights of the fit. Those for white noise
+    /// remain where the derivatives are unavailable.
     pub fn with_coloured_std(mut self, records: &Records) -> Self {
         if let Some((free, covariance)) = coloured_covariance(&self, records) {
             for (i, k) in free.iter().enumerate() {

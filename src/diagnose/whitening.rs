@@ -133,7 +133,9 @@ impl SearchState {
     pub(super) fn weigh(&mut self) {
         let fitted = &self.after.fitted;
         let context = &fitted.structure.context;
-        let is_plain = context.several.is_none() && context.measures == Motion::Displacement;
+        let is_plain = context.several.is_none()
+            && context.held.is_none()
+            && context.measures == Motion::Displacement;
         let stand = fitted.stand();
         let floor = NoiseFloor::measured(&self.before.train, &stand.mode());
         let is_small =

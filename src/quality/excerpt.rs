@@ -46,7 +46,7 @@ pub struct Of<'a> {
 /// let of = Of { name: "bridge", unit: "mV", scale: 1e3, rate_hz: 1e3, start: Moment::default(), samples: 5000, faults };
 /// let found = warnings(&samples[..1000], of);
 /// assert_eq!((found.len(), found[0].code), (1, "stuck-channel"));
-/// assert!(found[0].message.contains("from 3 s on, 10 samples"), "{}", found[0].message);
+/// assert!(found[0].message.contains("10 samples at 0 mV, starting at 3 s"), "{}", found[0].message);
 /// ```
 #[must_use]
 pub fn warnings(samples: &[f64], of: Of) -> Vec<Warning> {

@@ -115,7 +115,7 @@ fn rates_that_differ_are_refused() {
             ],
         );
         let said = both(&record).unwrap_err().to_string();
-        assert!(said.contains("\"b\" has 250 Hz"), "{said}");
+        assert!(said.contains("\"b\" is sampled at 250 Hz"), "{said}");
     }
     let late = TimeAxis::of_header("dt", 1000.0, Some(0.25));
     let first = TimeAxis::of_header("dt", 1000.0, Some(0.0));
@@ -127,7 +127,7 @@ fn rates_that_differ_are_refused() {
         both(&record)
             .unwrap_err()
             .to_string()
-            .contains("from 0.25 s on")
+            .contains("starting at 0.25 s")
     );
 }
 

@@ -288,8 +288,11 @@ pub fn welch_steep(
     Ok(SteepSum::of(samples, block_length).density(sample_rate_hz, block_length))
 }
 
-/// Density as by [`welch_steep`], in which the ends of the record count as much as the rest: they are covered by blocks of
-/// a half, a quarter and an eighth of the length, which must be a power of two.
+/// Density as by [`welch_steep`], in which signal that is in the ends of the record alone counts as well: they are
+/// covered by blocks of a half, a quarter and an eighth of the length, which must be a power of two.
+///
+/// A shorter block counts at the lines at which it has far more power than that density explains, with its coarser
+/// lines: a steady line keeps its width.
 ///
 /// # Errors
 /// As for [`welch`].
@@ -311,14 +314,17 @@ pub fn welch_to_the_ends(
 ) -> Result<Density, Error> {
     check(samples, sample_rate_hz, block_length)?;
     let mut sum = SteepSum::of(samples, block_length);
+    let whole = sum.powers.clone();
     // The outermost whole blocks stand for what is farther from the ends than three eighths of their length, each
     // shorter one for half of the rest.
     let mut length = block_length / 2;
     let mut share = 3.0 / 16.0 * block_length as f64;
     while length >= (block_length / 8).max(SHORTEST_AT_ENDS) {
         let shorter = SteepBlock::of_length(length);
+        let explained = shorter.seen(&whole);
         for start in [0, samples.len() - length] {
-            sum.add(&shorter.power(&samples[start..start + length]), share);
+            let power = shorter.power(&samples[start..start + length]);
+            sum.add_end(&power, &explained, share / samples.len() as f64);
         }
         (length, share) = (length / 2, 0.5 * share);
     }
@@ -329,6 +335,9 @@ pub fn welch_to_the_ends(
 const SHORTEST_AT_ENDS: usize = 64;
 /// Lines of a shorter block that hold the mean with the main lobe of the window.
 const MEAN_LINES: usize = 4;
+/// Power of a shorter block relative to that explained, from which it counts: that of noise is hardly ever ten times its
+/// mean.
+const FAR_MORE: f64 = 10.0;
 /// Ratio of the number of blocks a quarter apart to that of independent ones: `1 + 2 Σ ρ²` with the correlations
 /// `ρ = Σ w w'/Σ w²` of the windows, 0.486 and 0.043.
 const ALIKE: f64 = 1.48;
@@ -350,6 +359,32 @@ impl SteepBlock {
         }
     }
 
+    /// The power that a block of this length shows of a spectrum with closer lines: its mean over the squared transform of
+    /// the window.
+    fn seen(&self, power: &[f64]) -> Vec<f64> {
+        let last = power.len() - 1;
+        let apart = 2 * last / self.window.len();
+        let reach = MEAN_LINES * apart;
+        let turn = -std::f64::consts::TAU / (2 * last) as f64;
+        let weight = |line: usize| {
+            let terms = self.window.iter().enumerate();
+            let sum = terms.map(|(i, w)| Complex64::from_polar(*w, turn * (line * i) as f64));
+            sum.sum::<Complex64>().norm_sqr()
+        };
+        let weights: Vec<f64> = (0..=reach).map(weight).collect();
+        let whole = weights[0] + 2.0 * weights[1..].iter().sum::<f64>();
+        let at = |place: usize| {
+            let beside = |d: usize| {
+                let above = last - last.abs_diff(place + d);
+                weights[d] * (power[place.abs_diff(d)] + power[above])
+            };
+            (weights[0] * power[place] + (1..=reach).map(beside).sum::<f64>()) / whole
+        };
+        (0..=self.window.len() / 2)
+            .map(|line| at(line * apart))
+            .collect()
+    }
+
     /// Squared magnitudes of a block without its mean, over its length.
     fn power(&self, block: &[f64]) -> Vec<f64> {
         let length = block.len() as f64;
@@ -364,44 +399,39 @@ impl SteepBlock {
     }
 }
 
-/// Weighted mean of the power of blocks, at the lines of the longest.
+/// Mean power of the blocks of a record.
 struct SteepSum {
     powers: Vec<f64>,
-    weights: Vec<f64>,
-    /// Number of blocks of the whole length.
     blocks: usize,
 }
 
 impl SteepSum {
-    /// Of the blocks of a record.
     fn of(samples: &[f64], block_length: usize) -> Self {
-        let lines = block_length / 2 + 1;
-        let mut sum = Self {
-            powers: vec![0.0; lines],
-            weights: vec![0.0; lines],
-            blocks: 0,
-        };
+        let mut powers = vec![0.0; block_length / 2 + 1];
         let last = samples.len() - block_length;
         let step = (block_length / 4).max(1);
         let whole = SteepBlock::of_length(block_length);
+        let (mut blocks, mut shares) = (0, 0);
         for start in (0..last).step_by(step).chain([last]) {
             let share = (last - start).min(step).max(1);
-            let block = &samples[start..start + block_length];
-            sum.add(&whole.power(block), share as f64);
-            sum.blocks += 1;
+            let power = whole.power(&samples[start..start + block_length]);
+            let both = powers.iter_mut().zip(power);
+            both.for_each(|(sum, power)| *sum += share as f64 * power);
+            (blocks, shares) = (blocks + 1, shares + share);
         }
-        sum
+        powers.iter_mut().for_each(|sum| *sum /= shares as f64);
+        Self { powers, blocks }
     }
 
-    /// Adds the power of a block, whose lines may be a multiple farther apart, with the length of the record for which
-    /// it stands.
-    fn add(&mut self, power: &[f64], share: f64) {
+    /// Adds a share of the power of a shorter block at an end beyond that explained by the others, where that is far
+    /// more.
+    fn add_end(&mut self, power: &[f64], explained: &[f64], share: f64) {
         let apart = (self.powers.len() - 1) / (power.len() - 1);
-        let first = if apart > 1 { MEAN_LINES * apart } else { 0 };
-        let sums = self.powers.iter_mut().zip(&mut self.weights).enumerate();
-        for (line, (sum, weight)) in sums.skip(first) {
-            *sum += share * power[(line + apart / 2) / apart];
-            *weight += share;
+        for (line, sum) in self.powers.iter_mut().enumerate().skip(MEAN_LINES * apart) {
+            let own = (line + apart / 2) / apart;
+            if power[own] > FAR_MORE * explained[own] {
+                *sum += share * (power[own] - explained[own]);
+            }
         }
     }
 
@@ -409,10 +439,8 @@ impl SteepSum {
     fn density(self, sample_rate_hz: f64, block_length: usize) -> Density {
         let mean_square = 35.0 / 128.0;
         let scale = 2.0 / (sample_rate_hz * mean_square);
-        let means = self.powers.iter().zip(&self.weights);
-        let mut values: Vec<f64> = means
-            .map(|(power, weight)| scale * power / weight)
-            .collect();
+        let mut values = self.powers;
+        values.iter_mut().for_each(|power| *power *= scale);
         let last = values.len() - 1;
         values[0] *= 0.5;
         values[last] *= 0.5;

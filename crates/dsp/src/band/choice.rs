@@ -317,7 +317,7 @@ mod tests {
         BandSearch::of_density(density, RATE, &inverse())?.best()
     }
 
-    /// A sine of 900 Hz in the last fortieth of a record, beside one of 20 Hz.
+    /// A sine of 900 Hz that begins in the last fortieth of a record, beside one of 20 Hz.
     #[test]
     fn what_begins_shortly_before_the_end_counts() {
         let mut state = 5_u64;
@@ -336,7 +336,7 @@ mod tests {
         for _ in 0..2 {
             let found = BandSearch::of_record(&record, RATE, &inverse()).unwrap();
             let found = found.best().unwrap();
-            assert!((880.0..1000.0).contains(&found.top_hz), "{found:?}");
+            assert!((880.0..2000.0).contains(&found.top_hz), "{found:?}");
             record.reverse();
         }
     }
