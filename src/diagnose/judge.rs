@@ -33,8 +33,8 @@ impl SearchState {
         })?;
         self.judge_surface();
         self.declared = self.declared.as_ref().and_then(|m| self.held_out(m));
-        self.weigh_again(threads);
         self.judge_candidates(threads);
+        self.weigh_again(threads);
         self.suspected = self.suspected.take().and_then(|mut guard| {
             guard.model = self.held_out(&guard.model)?;
             guard.errors = guard.model.errors();

@@ -293,7 +293,7 @@ impl SearchState {
         let coarse = found.records.substeps();
         found.weigh();
         found.build(coarse, workers);
-        found.drop_weights(workers.threads);
+        found.end_search(workers.threads);
         found.lower_noise_floor();
         found.ask_surface(workers.threads);
         Ok(found)

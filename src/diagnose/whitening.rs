@@ -102,20 +102,20 @@ impl Whitening {
 /// The model fitted again with weights.
 const AGAIN: FitEffort = FitEffort::full(8);
 
-impl Records {
-    /// Weights records for the noise on their applied quantity; `compared` are residuals of a model without effects on
-    /// the same records.
-    fn weigh(records: &mut [StandRecord], stand: &PlainStand, compared: &[RecordResidual]) {
-        let Some(floor) = NoiseFloor::measured(compared, &stand.mode()) else {
-            return;
-        };
-        for record in records {
-            let applied_std = noise_of_input(record.input.samples()).sqrt();
-            let stds = [applied_std, floor.rms];
-            record.whitening = Whitening::of((stand.mode(), stand.gain), record.rate_hz(), stds);
-        }
+/// Weights records for the noise on their applied quantity; `compared` are residuals of a model without effects on the same
+/// records.
+fn weigh(records: &mut [StandRecord], stand: &PlainStand, compared: &[RecordResidual]) {
+    let Some(floor) = NoiseFloor::measured(compared, &stand.mode()) else {
+        return;
+    };
+    for record in records {
+        let applied_std = noise_of_input(record.input.samples()).sqrt();
+        let stds = [applied_std, floor.rms];
+        record.whitening = Whitening::of((stand.mode(), stand.gain), record.rate_hz(), stds);
     }
+}
 
+impl Records {
     fn are_weighted(&self) -> bool {
         let all = self.train.iter().chain(&self.holdout);
         all.into_iter().any(|record| record.whitening.is_some())
@@ -143,7 +143,7 @@ impl SearchState {
         if !is_plain || self.records.are_weighted() || !floor.is_some_and(is_small) {
             return;
         }
-        Records::weigh(&mut self.records.train, &stand, &self.before.train);
+        weigh(&mut self.records.train, &stand, &self.before.train);
         if !self.records.are_weighted() {
             return;
         }
@@ -167,8 +167,8 @@ impl SearchState {
             return;
         }
         let stand = self.after.fitted.stand();
-        Records::weigh(&mut self.records.train, &stand, &self.before.train);
-        Records::weigh(&mut self.records.holdout, &stand, &self.before.compared);
+        weigh(&mut self.records.train, &stand, &self.before.train);
+        weigh(&mut self.records.holdout, &stand, &self.before.compared);
         self.score_again(threads);
     }
 
@@ -182,29 +182,31 @@ impl SearchState {
         self.score_again(threads);
     }
 
-    /// The residuals of all models with the present weights.
-    fn score_again(&mut self, threads: usize) {
-        let candidates = self.rounds.iter_mut().flatten();
-        let mut models: Vec<&mut ScoredModel> =
-            candidates.filter_map(|c| c.model.as_mut()).collect();
-        models.extend([&mut self.before, &mut self.after]);
-        models.extend(self.without.iter_mut().flatten());
-        models.extend(self.path.iter_mut());
-        models.extend(self.suspected.iter_mut().map(|guard| &mut guard.model));
-        let scored = parallel(models.len(), threads, |k| {
-            ScoredModel::of(models[k].fitted.clone(), &self.records)
-        });
-        for (model, scored) in models.into_iter().zip(scored) {
-            if let Some(scored) = scored {
-                *model = scored;
-            }
+    /// The same with the residuals of all candidates and of the models on the way to the result.
+    pub(super) fn end_search(&mut self, threads: usize) {
+        if !self.records.are_weighted() {
+            return;
         }
-        let is_held_out = !self.records.holdout.is_empty();
+        self.drop_weights(threads);
+        let candidates = self.rounds.iter_mut().flatten();
+        let models = candidates.filter_map(|c| c.model.as_mut());
+        score(
+            models.chain(&mut self.path).collect(),
+            &self.records,
+            threads,
+        );
         for candidate in self.rounds.iter_mut().flatten() {
             let errors = candidate.model.as_ref().map(ScoredModel::errors);
             candidate.train_rms = errors.map(|errors| errors.train_rms);
-            candidate.holdout_rms = errors.filter(|_| is_held_out).map(|e| e.holdout_rms);
         }
+    }
+
+    /// The residuals of the models that are compared in the end, with the present weights.
+    fn score_again(&mut self, threads: usize) {
+        let mut models = vec![&mut self.before, &mut self.after];
+        models.extend(self.without.iter_mut().flatten());
+        models.extend(self.suspected.iter_mut().map(|guard| &mut guard.model));
+        score(models, &self.records, threads);
         if let Some(guard) = &mut self.suspected {
             guard.errors = guard.model.errors();
         }
@@ -217,6 +219,18 @@ impl SearchState {
         self.noise_floor = NoiseFloor::of(&self.before.compared, &self.before.fitted.passage());
         self.tests_before = super::tests(&self.before);
         self.tests = super::tests(&self.after);
+    }
+}
+
+/// The residuals of models on records.
+fn score(models: Vec<&mut ScoredModel>, records: &Records, threads: usize) {
+    let scored = parallel(models.len(), threads, |k| {
+        ScoredModel::of(models[k].fitted.clone(), records)
+    });
+    for (model, scored) in models.into_iter().zip(scored) {
+        if let Some(scored) = scored {
+            *model = scored;
+        }
     }
 }
 

@@ -1,8 +1,8 @@
 //! Decays that begin anew or late: second taps, soft pushes, hits that noise hides.
 
-use torqcomp::identify::{Identification, decay};
+use torqcomp::identify::Identification;
 
-use super::{Noise, TAU, of, times};
+use super::{Noise, TAU, of, of_decay};
 
 const RATE_HZ: f64 = 5000.0;
 const NATURAL_HZ: f64 = 120.0;
@@ -35,15 +35,7 @@ fn pulse(t: f64, (at_s, length_s): (f64, f64)) -> f64 {
 
 fn identified(mut record: Vec<f64>, noise: &mut Noise, size: f64) -> Identification {
     record.iter_mut().for_each(|x| *x += size * noise.normal());
-    let ringing = decay::Ringing {
-        name: "simulated",
-        times_s: &times(record.len(), RATE_HZ),
-        rate_hz: Some(RATE_HZ),
-        values: &record,
-    };
-    decay::identify(&[ringing], &decay::DecayOptions::default())
-        .unwrap()
-        .0
+    of_decay(&record, RATE_HZ)
 }
 
 fn codes(found: &Identification) -> Vec<&str> {

@@ -2,7 +2,7 @@
 
 use torqcomp::identify::{Identification, decay};
 
-use super::{Noise, TAU, of, times};
+use super::{Noise, TAU, of, of_decay, times};
 
 const RATE_HZ: f64 = 5000.0;
 const NATURAL_HZ: f64 = 180.0;
@@ -45,15 +45,7 @@ fn identified(mut record: Vec<f64>, noise: &mut Noise) -> Identification {
     record
         .iter_mut()
         .for_each(|x| *x += 0.3 + 1e-3 * noise.normal());
-    let ringing = decay::Ringing {
-        name: "simulated",
-        times_s: &times(record.len(), RATE_HZ),
-        rate_hz: Some(RATE_HZ),
-        values: &record,
-    };
-    decay::identify(&[ringing], &decay::DecayOptions::default())
-        .unwrap()
-        .0
+    of_decay(&record, RATE_HZ)
 }
 
 /// Several modes, a restart at the stop, or a part that is driven.

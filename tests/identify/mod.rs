@@ -15,6 +15,7 @@ mod traps;
 mod trials;
 
 use serde_json::Value;
+use torqcomp::identify::decay::{self as estimator, Ringing};
 use torqcomp::identify::{Identification, NamedEstimate};
 
 use crate::noise::Noise;
@@ -23,6 +24,18 @@ const TAU: f64 = std::f64::consts::TAU;
 
 fn times(count: usize, rate_hz: f64) -> Vec<f64> {
     (0..count).map(|i| i as f64 / rate_hz).collect()
+}
+
+/// What a decay gives on its own.
+fn of_decay(record: &[f64], rate_hz: f64) -> Identification {
+    let ringing = Ringing {
+        name: "simulated",
+        times_s: &times(record.len(), rate_hz),
+        rate_hz: Some(rate_hz),
+        values: record,
+    };
+    let found = estimator::identify(&[ringing], &estimator::DecayOptions::default());
+    found.unwrap().0
 }
 
 fn of<'a>(result: &'a Identification, name: &str) -> &'a NamedEstimate {

@@ -37,6 +37,8 @@ pub mod recorder;
 pub mod resample;
 pub mod spectrum;
 pub mod store;
+#[cfg(test)]
+mod test_noise;
 pub mod undersample;
 pub mod weak;
 pub mod zero_phase;

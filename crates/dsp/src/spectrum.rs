@@ -455,6 +455,7 @@ impl SteepSum {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_noise::noise;
 
     /// Direct transform of the windowed block by definition, term by term.
     fn slow_hann_power(block: &[f64]) -> Vec<f64> {
@@ -491,19 +492,10 @@ mod tests {
 
     #[test]
     fn white_noise_has_a_flat_density_of_twice_variance_over_rate() {
-        let mut state = 1_u64;
+        let mut noise = noise(1);
+        // Sums of four uniform numbers of variance 1/12 each.
         let samples: Vec<f64> = (0..1 << 16)
-            .map(|_| {
-                // Sum of four uniform numbers of variance 1/12 each.
-                (0..4)
-                    .map(|_| {
-                        state = state
-                            .wrapping_mul(6_364_136_223_846_793_005)
-                            .wrapping_add(1_442_695_040_888_963_407);
-                        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-                    })
-                    .sum()
-            })
+            .map(|_| (0..4).map(|_| noise()).sum())
             .collect();
         let density = welch(&samples, 500.0, 256).unwrap();
         let expected = 2.0 * (4.0 / 12.0) / 500.0;

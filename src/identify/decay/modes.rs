@@ -73,6 +73,11 @@ impl Stretch {
         }
     }
 
+    /// Time of the last sample.
+    pub(super) fn end_s(&self) -> f64 {
+        self.start_s + self.times_s.last().copied().unwrap_or(0.0)
+    }
+
     /// Samples per second.
     pub(super) fn rate_hz(&self) -> f64 {
         (self.times_s.len() - 1) as f64 / self.times_s.last().copied().unwrap_or(1.0)

@@ -3,8 +3,6 @@
 //! Dry friction widens the line of a mode and ends its decay. A sum of decaying sines follows this only with several modes
 //! about the true one, or piece by piece; [`super::friction`] does with one more parameter.
 
-use std::ops::Range;
-
 use num_complex::Complex64;
 use torqcomp_model::fit::FitError;
 
@@ -143,13 +141,9 @@ fn later(one: &ModesFit, (before, after): (&[Stretch], &[Stretch])) -> Vec<f64> 
 
 /// Rms residual of a fit at the times of these segments; of all if it has none of them.
 fn while_moving((found, kept): (&ModesFit, &[Stretch]), moving: &[Stretch]) -> f64 {
-    let times = |stretch: &Stretch| -> Range<f64> {
-        stretch.start_s..stretch.start_s + stretch.times_s.last().copied().unwrap_or(0.0)
-    };
     let moves = |time_s: f64| {
-        moving
-            .iter()
-            .any(|stretch| times(stretch).contains(&time_s))
+        let mut all = moving.iter();
+        all.any(|stretch| (stretch.start_s..stretch.end_s()).contains(&time_s))
     };
     let pairs = kept.iter().zip(&found.residuals);
     let within = pairs.flat_map(|(stretch, residuals)| {
@@ -173,7 +167,7 @@ fn rests(recorded: &[Stretch], one: &ModesFit, moving: &[Stretch]) -> Result<boo
     let friction = one.fit.values.last().copied().unwrap_or(0.0);
     let reach = (AS_GOOD * one.fit.rms).hypot(friction);
     for (recorded, moving) in recorded.iter().zip(moving) {
-        let stop_s = moving.start_s + moving.times_s.last().copied().unwrap_or(0.0);
+        let stop_s = moving.end_s();
         let stop = recorded
             .times_s
             .partition_point(|t| recorded.start_s + t <= stop_s);

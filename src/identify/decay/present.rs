@@ -231,12 +231,10 @@ pub(super) fn method(fit: &ModesFit, stretches: usize) -> String {
 
 /// Note about samples after the stop.
 pub(super) fn stops(recorded: &[Stretch], moving: &[Stretch]) -> Option<String> {
-    let end_s =
-        |stretch: &Stretch| stretch.start_s + stretch.times_s.last().copied().unwrap_or(0.0);
     let pairs = recorded.iter().zip(moving);
     let stopped: Vec<String> = pairs
-        .filter(|(all, moving)| end_s(moving) < end_s(all))
-        .map(|(_, moving)| rounded(end_s(moving), 5))
+        .filter(|(all, moving)| moving.end_s() < all.end_s())
+        .map(|(_, moving)| rounded(moving.end_s(), 5))
         .take(NAMED)
         .collect();
     (!stopped.is_empty()).then(|| {

@@ -92,10 +92,8 @@ pub(super) fn order(
         ));
     }
     let errors = tried(set, lines, options, &folds)?;
-    let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
-    let best = errors.iter().position(|e| *e <= SLACK * least).unwrap_or(0);
     // Leakage may hide a mode in blocks, but not in whole records.
-    let best = match (best, set.window) {
+    let best = match (fewest(&errors), set.window) {
         (0, Window::Hann) if errors.len() > 1 => least_of_some(&errors),
         (0, _) => return Err(unexplained()),
         (best, _) => best,
@@ -110,10 +108,15 @@ fn least_of_some(errors: &[f64]) -> usize {
         .unwrap_or(1)
 }
 
-/// Whether no number of modes clearly reduces the hold-out error.
-pub(super) fn is_unexplained(errors: &[f64]) -> bool {
+/// The fewest modes with about the smallest hold-out error.
+fn fewest(errors: &[f64]) -> usize {
     let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
-    errors.first().is_some_and(|none| *none <= SLACK * least)
+    errors.iter().position(|e| *e <= SLACK * least).unwrap_or(0)
+}
+
+/// Whether no number of modes clearly reduces the hold-out error, if that without modes is known.
+pub(super) fn is_unexplained(errors: &[f64]) -> bool {
+    errors.first().is_some_and(|none| !none.is_nan()) && fewest(errors) == 0
 }
 
 pub(super) fn unexplained() -> Failure {

@@ -264,11 +264,8 @@ fn from_noise(
     let squares = fitted.fit.as_ref().map_or(0.0, |f| f.sum_of_squares);
     let top = data.weight.iter().copied().fold(0.0, f64::max);
     let counted = data.weight.iter().filter(|w| **w > SILENT * top).count();
-    let linear = 2 * solved.modes + data.outside();
-    let linear = linear
-        - (0..linear)
-            .filter(|j| data.is_zero(*j, solved.modes))
-            .count();
+    let linear = 0..2 * solved.modes + data.outside();
+    let linear = linear.filter(|j| !data.is_zero(*j, solved.modes)).count();
     let searched = solved.free.iter().filter(|i| **i < solved.searched).count();
     let freedom = (2 * counted).saturating_sub(searched + linear).max(1);
     let power = 2.0 * squares / freedom as f64;

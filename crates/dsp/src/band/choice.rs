@@ -292,6 +292,7 @@ mod tests {
     use num_complex::Complex64;
 
     use super::*;
+    use crate::test_noise::noise;
 
     const RATE: f64 = 10_000.0;
 
@@ -320,13 +321,7 @@ mod tests {
     /// A sine of 900 Hz that begins in the last fortieth of a record, beside one of 20 Hz.
     #[test]
     fn what_begins_shortly_before_the_end_counts() {
-        let mut state = 5_u64;
-        let mut noise = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        };
+        let mut noise = noise(5);
         let wave = |hz: f64, i: usize| (std::f64::consts::TAU * hz * i as f64 / RATE).sin();
         let sample = |i: usize| {
             let late = if i < 39_000 { 0.0 } else { wave(900.0, i) };
