@@ -25,7 +25,7 @@ pub(super) struct Attempt<'a> {
     pub has_baseline: bool,
     /// Whether a line other than the mains is steady.
     pub has_tone: bool,
-    wanted: &'a ModeSearch,
+    wanted: ModeSearch,
     /// Lines removed earlier, and number removed since.
     taken_off: (&'a [SteadyLine], usize),
     takes_tones: bool,
@@ -43,7 +43,7 @@ impl<'a> Attempt<'a> {
     /// [`FitError`] if there are too few samples.
     pub fn of(
         stretches: &mut [Stretch],
-        wanted: &'a ModeSearch,
+        wanted: &ModeSearch,
         taken_off: &'a [SteadyLine],
         takes_tones: bool,
     ) -> Result<Self, FitError> {
@@ -52,7 +52,7 @@ impl<'a> Attempt<'a> {
             lines: Vec::new(),
             has_baseline: false,
             has_tone: false,
-            wanted,
+            wanted: *wanted,
             taken_off: (taken_off, 0),
             takes_tones,
             tones: Vec::new(),
@@ -72,13 +72,13 @@ impl<'a> Attempt<'a> {
     }
 
     /// A finished search with one mode and dry friction.
-    pub fn with_friction(fit: ModesFit, wanted: &'a ModeSearch) -> Self {
+    pub fn with_friction(fit: ModesFit, wanted: &ModeSearch) -> Self {
         Self {
             fit,
             lines: Vec::new(),
             has_baseline: false,
             has_tone: false,
-            wanted,
+            wanted: *wanted,
             taken_off: (&[], 0),
             takes_tones: false,
             tones: Vec::new(),

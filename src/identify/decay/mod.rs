@@ -17,9 +17,11 @@ mod search;
 mod stretches;
 mod turns;
 
+use super::hum::SteadyLine;
 use super::{FitQuality, Identification, ModalPole, hum, rms};
 use crate::failure::Failure;
 use crate::warning::Warning;
+use torqcomp_model::fit::FitError;
 
 use anew::Beginning;
 use attempt::Attempt;
@@ -78,17 +80,9 @@ fn evaluated(
         band_hz: options.band_hz.unwrap_or((0.0, f64::INFINITY)),
     };
     let recorded = stretches.clone();
-    let found = search::search(&mut stretches, &wanted, &lines)?;
-    let (mut found, mut beginnings) = anew::cut(found, &mut stretches, (&wanted, &lines))?;
-    let is_split = found.fit.poles.len() > 1 || !beginnings.is_empty();
-    if is_split
-        && options.modes.is_none_or(|modes| modes == 1)
-        && let Some((one, moving)) =
-            one_mode::instead((&found.fit, &stretches), &recorded, &wanted)?
-    {
-        (found, beginnings) = (Attempt::with_friction(one, &wanted), Vec::new());
-        result.method.extend(present::stops(&recorded, &moving));
-        stretches = moving;
+    let (found, beginnings) = found(&mut stretches, (&wanted, &lines))?;
+    if found.fit.has_friction {
+        result.method.extend(present::stops(&recorded, &stretches));
     }
     let consequences = [stretches::OWN_PARTS, LEFT_OUT];
     let told = present::beginnings(&beginnings, consequences);
@@ -117,6 +111,44 @@ fn evaluated(
     by_hand::compare(&mut result, &fit, &stretches, order[0]);
     present::draw(&mut result, &fit, &stretches);
     Ok((result, stretches, beginnings))
+}
+
+/// The modes of the segments, or one with dry friction, and the moments at which decays begin anew; the segments are left
+/// as they were fitted.
+///
+/// # Errors
+/// [`FitError`] if there are too few samples.
+fn found<'a>(
+    stretches: &mut Vec<Stretch>,
+    (wanted, lines): (&'a ModeSearch, &'a [SteadyLine]),
+) -> Result<(Attempt<'a>, Vec<Beginning>), FitError> {
+    let recorded = stretches.clone();
+    // A fit of many modes takes long, and dry friction looks like many.
+    let few = ModeSearch {
+        most: one_mode::SEVERAL,
+        ..*wanted
+    };
+    let with_friction = |(one, moving): (ModesFit, Vec<Stretch>), stretches: &mut Vec<Stretch>| {
+        *stretches = moving;
+        (Attempt::with_friction(one, wanted), Vec::new())
+    };
+    let mut found = search::search(stretches, &few, lines)?;
+    if wanted.count.is_none() && found.fit.poles.len() >= few.most {
+        if let Some(moving) = one_mode::at_once((&found.fit, stretches), &recorded, &few)? {
+            return Ok(with_friction(moving, stretches));
+        }
+        stretches.clone_from(&recorded);
+        found = search::search(stretches, wanted, lines)?;
+    }
+    let (found, beginnings) = anew::cut(found, stretches, (wanted, lines))?;
+    let is_split = found.fit.poles.len() > 1 || !beginnings.is_empty();
+    if is_split
+        && wanted.count.is_none_or(|modes| modes == 1)
+        && let Some(moving) = one_mode::instead((&found.fit, stretches), &recorded, wanted)?
+    {
+        return Ok(with_friction(moving, stretches));
+    }
+    Ok((found, beginnings))
 }
 
 /// Adds the modes, the strongest first, with their constants.

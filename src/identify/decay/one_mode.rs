@@ -7,6 +7,7 @@ use num_complex::Complex64;
 use torqcomp_model::fit::FitError;
 
 use super::anew::AS_GOOD;
+use super::attempt::Attempt;
 use super::friction::{self, OF_STRETCH, SlidingMotion};
 use super::modes::{self, ModesFit, Stretch};
 use super::search::{ModeSearch, next_pole};
@@ -27,6 +28,33 @@ const LATER: [f64; 2] = [0.0, 1.0];
 
 /// One mode with dry friction, and the segments up to the stop.
 type Moving = (ModesFit, Vec<Stretch>);
+
+/// Number of modes from which a decay may be one mode with dry friction.
+pub(super) const SEVERAL: usize = 2;
+
+/// One mode with dry friction, if it describes the recorded segments as well as this fit of as few modes, which a search
+/// was limited to, and leaves only noise.
+///
+/// # Errors
+/// [`FitError`] if there are too few samples.
+pub(super) fn at_once(
+    several: (&ModesFit, &[Stretch]),
+    recorded: &[Stretch],
+    few: &ModeSearch,
+) -> Result<Option<Moving>, FitError> {
+    let Some((one, moving)) = instead(several, recorded, few)? else {
+        return Ok(None);
+    };
+    let left = moving.iter().zip(&one.residuals);
+    let left = left.map(|(stretch, residuals)| Stretch {
+        values: residuals.clone(),
+        ..stretch.clone()
+    });
+    let mut left: Vec<Stretch> = left.collect();
+    let more = Attempt::of(&mut left, few, &[], true)?;
+    let is_noise = more.fit.poles.is_empty() && more.lines.is_empty() && !more.has_baseline;
+    Ok(is_noise.then_some((one, moving)))
+}
 
 /// One mode with dry friction, if it describes the recorded segments as well as a fit of several modes or of later parts.
 ///

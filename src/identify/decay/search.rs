@@ -49,7 +49,7 @@ const STEADY_STD: f64 = 3.0;
 /// [`FitError`] if there are too few samples. Without a significant mode the fit is empty.
 pub(super) fn search<'a>(
     stretches: &mut Vec<Stretch>,
-    wanted: &'a ModeSearch,
+    wanted: &ModeSearch,
     taken_off: &'a [SteadyLine],
 ) -> Result<Attempt<'a>, FitError> {
     let recorded = stretches.clone();

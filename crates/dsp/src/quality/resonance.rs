@@ -1,13 +1,14 @@
 //! A resonance in a record where none is declared.
 
+use crate::dot;
 use crate::spectrum::{Density, welch};
 
 /// A resonance in the spectrum of a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resonance {
-    /// Frequency of the peak in Hz.
+    /// Natural frequency in Hz.
     pub frequency_hz: f64,
-    /// Damping ratio from the half-power bandwidth: `Δf/(2 f)`.
+    /// Damping ratio.
     pub damping_ratio: f64,
 }
 
@@ -19,29 +20,36 @@ const NEAR: [f64; 2] = [0.4, 2.5];
 const BLOCKS: usize = 7;
 /// Number of block lengths, each half of the previous one; the longest resolves a sixteenth of the declared width.
 const RESOLUTIONS: u32 = 4;
-/// Minimum half-power bandwidth, in steps of the spectrum: a line with a Hann window has 1.4.
-const BROAD: f64 = 4.0;
-/// Maximum half-power bandwidth, relative to the frequency.
+/// Relative width of the bands in which the spectrum is averaged, and minimum number of such bands.
+const BAND: f64 = 0.015;
+const FEWEST: usize = 24;
+/// Minimum power of a band relative to the quietest part of the spectrum, one of so many.
+const ABOVE_NOISE: f64 = 10.0;
+const PARTS: usize = 16;
+/// Number of frequencies, and the damping ratios, from which the best fit is searched.
+const PLACES: u32 = 60;
+const RATIOS: [f64; 3] = [0.01, 0.03, 0.1];
+/// Largest damping ratio of a resonance that is reported, and smallest one of the search.
 const WIDEST: f64 = 0.2;
-/// Minimum power of a peak relative to the median of the spectrum.
-const STRONG: f64 = 30.0;
-/// Distances from the peak in bandwidths, and accepted ranges of the relative power; a resonance has 1/5
-/// and 1/17.
-const SKIRT: [(f64, [f64; 2]); 2] = [(1.0, [0.1, 0.4]), (2.0, [0.02, 0.17])];
-/// Largest power at the declared frequency, relative to that some widths to either side, that is not a peak; a mode
-/// would have 17 times as much.
-const NO_PEAK: f64 = 2.5;
-/// Distance from a mode, in declared half-widths, at which its power has fallen to 1/17.
-const ASIDE: f64 = 4.0;
+const SHARPEST: f64 = 1e-3;
+/// Factors on frequency and damping ratio that are tried at first, and by which they approach 1.
+const FIRST: [f64; 2] = [0.03, 0.5];
+const STEPS: u32 = 24;
+/// Largest rms difference of the logarithm of the power from that of a resonance.
+const FITS: f64 = 0.5;
+/// How many times as large its square is without the resonance, and with the declared one.
+const WORSE: f64 = 4.0;
+/// Smallest difference from a declared frequency.
+const APART: f64 = 0.04;
 
 /// The resonance of a record near the first of several declared modes (natural frequency in Hz and damping ratio), if
-/// the record shows none at that mode.
+/// the record shows that one instead of the declared ones.
 ///
-/// The power near a resonance falls as `1/(1 + (2 Δ/w)²)` at a distance `Δ`, with the half-power bandwidth `w = 2 ζ f`.
-/// A peak is a resonance if it is at least four steps of the spectrum wide (a steady line is narrower), 30 times as
-/// strong as the median of the spectrum, and falls off on both sides by that law (an order swept with the speed ends
-/// abruptly). It must be away from all declared modes by its width and 5 %, while the spectrum has no peak at the first
-/// of them.
+/// A machine that hits, steps or makes noise applies a torque whose power is a smooth function of frequency, so that
+/// the record's power is that function times `1/((1 − r²)² + (2ζr)²)`, `r = f/f₀`. The logarithm of the power in bands
+/// of 1.5 % is fitted by `a + b ln f + c f²` plus the logarithm of the resonance. The resonance is reported if this
+/// fits within 0.5 rms, and four times as well (in squares) as no resonance and as the declared one, and if it is at
+/// least 4 % away from all declared ones. Lines, orders swept with the speed and bands of noise do not fit.
 ///
 /// ```
 /// use torqcomp_dsp::quality::resonance::other_resonance;
@@ -70,103 +78,145 @@ pub fn other_resonance(
     let powers = (finest.saturating_sub(RESOLUTIONS - 1)..=finest).rev();
     powers.filter(|power| *power <= longest).find_map(|power| {
         let density = welch(samples, rate_hz, 1 << power).ok()?;
-        in_spectrum(&Smooth::of(&density), [from_hz, to_hz], declared)
+        let shape = Shape::of(&density, [from_hz, to_hz])?;
+        shape.other_resonance(declared)
     })
 }
 
-/// The same in a spectrum of one resolution.
-fn in_spectrum(
-    spectrum: &Smooth,
-    [from_hz, to_hz]: [f64; 2],
-    declared: &[(f64, f64)],
-) -> Option<Resonance> {
-    let (declared_hz, ratio) = declared[0];
-    let step_hz = spectrum.step_hz;
-    let found = spectrum.resonance(from_hz, to_hz)?;
-    let width_hz = 2.0 * found.damping_ratio * found.frequency_hz;
-    let is_off = |(hz, _): &(f64, f64)| {
-        let off_hz = (found.frequency_hz - hz).abs();
-        off_hz > width_hz && off_hz > 0.05 * hz
-    };
-    let is_missing = spectrum.has_no_peak(declared_hz, (ratio * declared_hz).max(step_hz));
-    (declared.iter().all(is_off) && is_missing).then_some(found)
+/// Logarithm of a spectrum in bands, without the smooth functions that an input may have.
+struct Shape {
+    frequency_hz: Vec<f64>,
+    log_power: Vec<f64>,
+    /// The smooth functions, orthonormal.
+    smooth: Vec<Vec<f64>>,
 }
 
-/// A spectrum averaged over three adjacent frequencies.
-struct Smooth {
-    step_hz: f64,
-    values: Vec<f64>,
-    median: f64,
-}
-
-impl Smooth {
-    fn of(density: &Density) -> Self {
-        let values: Vec<f64> = density
+impl Shape {
+    /// `None` if too few bands are above the noise.
+    fn of(density: &Density, [from_hz, to_hz]: [f64; 2]) -> Option<Self> {
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let parts = density
             .values
-            .windows(3)
-            .map(|three| three.iter().sum::<f64>() / 3.0)
-            .collect();
-        let mut sorted = values.clone();
-        let middle = sorted.len() / 2;
-        let (_, median, _) = sorted.select_nth_unstable_by(middle, f64::total_cmp);
-        Self {
-            step_hz: density.step_hz,
-            median: *median,
-            values,
+            .chunks_exact((density.values.len() / PARTS).max(1));
+        let least = ABOVE_NOISE * parts.map(mean).fold(f64::INFINITY, f64::min);
+        let (mut frequency_hz, mut log_power) = (Vec::new(), Vec::new());
+        let mut lower_hz = from_hz;
+        while lower_hz < to_hz {
+            let upper_hz = (lower_hz * (1.0 + BAND)).max(lower_hz + 0.999 * density.step_hz);
+            let band: Vec<f64> = density
+                .between(lower_hz, upper_hz)
+                .map(|(_, p)| p)
+                .collect();
+            if !band.is_empty() && mean(&band) > least {
+                frequency_hz.push(0.5 * (lower_hz + upper_hz));
+                log_power.push(mean(&band).ln());
+            }
+            lower_hz = upper_hz;
+        }
+        (log_power.len() >= FEWEST).then(|| Self::new(frequency_hz, log_power))
+    }
+
+    fn new(frequency_hz: Vec<f64>, log_power: Vec<f64>) -> Self {
+        let scale_hz = frequency_hz[frequency_hz.len() / 2];
+        let functions: [fn(f64) -> f64; 3] = [|_| 1.0, f64::ln, |r| r * r];
+        let mut shape = Self {
+            frequency_hz,
+            log_power,
+            smooth: Vec::new(),
+        };
+        for function in functions {
+            let mut column: Vec<f64> = shape
+                .frequency_hz
+                .iter()
+                .map(|hz| function(hz / scale_hz))
+                .collect();
+            shape.clear(&mut column);
+            let size = dot(&column, &column).sqrt();
+            column.iter_mut().for_each(|x| *x /= size);
+            shape.smooth.push(column);
+        }
+        shape
+    }
+
+    /// Removes the smooth functions.
+    fn clear(&self, values: &mut [f64]) {
+        for column in &self.smooth {
+            let part = dot(values, column);
+            values
+                .iter_mut()
+                .zip(column)
+                .for_each(|(x, c)| *x -= part * c);
         }
     }
 
-    /// Index of a frequency; the first average is centred on the second one.
-    fn place(&self, hz: f64) -> usize {
-        ((hz / self.step_hz).round() as usize).saturating_sub(1)
-    }
-
-    /// Mean power between two frequencies.
-    fn mean(&self, from_hz: f64, to_hz: f64) -> Option<f64> {
-        let part = self.values.get(self.place(from_hz)..=self.place(to_hz))?;
-        Some(part.iter().sum::<f64>() / part.len() as f64)
-    }
-
-    /// The strongest peak in a range, if it is a resonance.
-    fn resonance(&self, from_hz: f64, to_hz: f64) -> Option<Resonance> {
-        let range = self.place(from_hz)..=self.place(to_hz);
-        let best = range.max_by(|a, b| self.values[*a].total_cmp(&self.values[*b]))?;
-        let top = self.values[best];
-        let is_below = |place: &usize| self.values[*place] < 0.5 * top;
-        let left = (0..best).rev().find(is_below)?;
-        let right = (best..self.values.len()).find(is_below)?;
-        // Averaging three adds little to a width of four.
-        let width_hz = (right - left - 1) as f64 * self.step_hz;
-        let frequency_hz = (0.5 * (left + right) as f64 + 1.0) * self.step_hz;
-        let is_peak = best > self.place(from_hz) && best < self.place(to_hz);
-        let is_broad = width_hz >= BROAD * self.step_hz && width_hz <= WIDEST * frequency_hz;
-        let falls = |(widths, [least, most]): (f64, [f64; 2])| {
-            let near_hz = 0.25 * width_hz;
-            [-widths, widths].into_iter().all(|side| {
-                let at_hz = frequency_hz + side * width_hz;
-                let mean = self.mean(at_hz - near_hz, at_hz + near_hz);
-                mean.is_some_and(|power| (least..=most).contains(&(power / top)))
+    /// Mean square of what is left without the power of a resonance.
+    fn misfit(&self, resonance: Option<&Resonance>) -> f64 {
+        let log_gain = |hz: f64| {
+            resonance.map_or(0.0, |found| {
+                let r = hz / found.frequency_hz;
+                -((1.0 - r * r).powi(2) + (2.0 * found.damping_ratio * r).powi(2)).ln()
             })
         };
-        let is_resonance = is_peak && is_broad && top > STRONG * self.median;
-        (is_resonance && SKIRT.into_iter().all(falls)).then_some(Resonance {
-            frequency_hz,
-            damping_ratio: 0.5 * width_hz / frequency_hz,
-        })
+        let both = self.frequency_hz.iter().zip(&self.log_power);
+        let mut left: Vec<f64> = both.map(|(hz, power)| power - log_gain(*hz)).collect();
+        self.clear(&mut left);
+        dot(&left, &left) / left.len() as f64
     }
 
-    /// Whether there is no peak of a given half-width at a frequency.
-    fn has_no_peak(&self, hz: f64, half_hz: f64) -> bool {
-        let aside_hz = ASIDE * half_hz;
-        let sides = [-1.0, 1.0].map(|side| {
-            let at_hz = hz + side * aside_hz;
-            self.mean(at_hz - half_hz, at_hz + half_hz)
-        });
-        let ([Some(below), Some(above)], Some(at)) = (sides, self.mean(hz - half_hz, hz + half_hz))
-        else {
-            return false;
+    /// The resonance that fits best, and its misfit.
+    fn best(&self) -> (Resonance, f64) {
+        let (first, last) = (
+            self.frequency_hz[0],
+            self.frequency_hz[self.frequency_hz.len() - 1],
+        );
+        let place = |k: u32| first * (last / first).powf(f64::from(k) / f64::from(PLACES));
+        let at = |frequency_hz, damping_ratio| {
+            let resonance = Resonance {
+                frequency_hz,
+                damping_ratio,
+            };
+            (resonance, self.misfit(Some(&resonance)))
         };
-        at < NO_PEAK * (below * above).sqrt()
+        let grid = (1..PLACES).flat_map(|k| RATIOS.map(|ratio| at(place(k), ratio)));
+        let better = |a: &(Resonance, f64), b: &(Resonance, f64)| a.1.total_cmp(&b.1);
+        let mut best = grid.min_by(better).expect("the grid has places");
+        let mut steps = FIRST;
+        for _ in 0..STEPS {
+            let around = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)].map(|(hz, ratio)| {
+                let ratio = best.0.damping_ratio * (1.0 + steps[1]).powf(ratio);
+                let hz = best.0.frequency_hz * (1.0 + steps[0]).powf(hz);
+                at(hz.clamp(first, last), ratio.clamp(SHARPEST, 2.0 * WIDEST))
+            });
+            let next = around.into_iter().min_by(better).expect("there are four");
+            if next.1 < best.1 {
+                best = next;
+            } else {
+                steps = steps.map(|step| 0.5 * step);
+            }
+        }
+        best
+    }
+
+    fn other_resonance(&self, declared: &[(f64, f64)]) -> Option<Resonance> {
+        let (found, misfit) = self.best();
+        let (frequency_hz, damping_ratio) = declared[0];
+        let as_declared = Resonance {
+            frequency_hz,
+            damping_ratio,
+        };
+        let width_hz = 2.0 * found.damping_ratio * found.frequency_hz;
+        let shows = |side: f64| {
+            let hz = found.frequency_hz + side * width_hz;
+            self.frequency_hz
+                .iter()
+                .any(|at| (at - hz).abs() < 0.5 * width_hz)
+        };
+        let is_off = |(hz, _): &(f64, f64)| (found.frequency_hz - hz).abs() > APART * hz;
+        let fits = misfit < FITS * FITS
+            && WORSE * misfit < self.misfit(None)
+            && WORSE * misfit < self.misfit(Some(&as_declared));
+        let is_resonance = found.damping_ratio < WIDEST && shows(-1.0) && shows(1.0);
+        (fits && is_resonance && declared.iter().all(is_off)).then_some(found)
     }
 }
 
@@ -214,6 +264,53 @@ mod tests {
                     assert_eq!(found, None);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn a_wrong_natural_frequency_of_a_damped_stand_is_found_from_steps_and_hits() {
+        let count = 20_000;
+        // Steps to levels without order every quarter of a second, and short hits.
+        let levels = noise(11, 16);
+        let steps: Vec<f64> = (0..count).map(|i| levels[i / 1250]).collect();
+        let mut hits = vec![0.0; count];
+        for at in [550, 2600, 5350, 7750, 13_000] {
+            hits[at..at + 4].copy_from_slice(&[3.0, 7.0, 7.0, 3.0]);
+        }
+        let quiet: Vec<f64> = noise(5, count).iter().map(|x| 0.003 * x).collect();
+        for input in [steps, hits] {
+            for (hz, ratio) in [(590.0, 0.07), (590.0, 0.02), (300.0, 0.1)] {
+                let record = sum(&rung(&input, 5000.0, hz, ratio), &quiet);
+                for declared in [0.85, 0.94, 1.0, 1.06, 1.2] {
+                    let found = other_resonance(&record, 5000.0, &[(declared * hz, ratio)]);
+                    let found_hz = found.map(|f| f.frequency_hz);
+                    let is_found = found_hz.is_some_and(|found| (found / hz - 1.0).abs() < 0.02);
+                    assert_eq!(
+                        is_found,
+                        declared != 1.0,
+                        "{hz} {ratio} {declared} {found_hz:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_resonance_of_the_machine_beside_that_of_the_stand_is_not_taken_for_it() {
+        for seed in 0..40 {
+            let torque = rung(
+                &noise(seed, 65_536),
+                20_000.0,
+                400.0 + 20.0 * seed as f64,
+                0.05,
+            );
+            let torque = sum(&torque, &noise(seed + 100, 65_536));
+            let record = rung(&torque, 20_000.0, 590.0, 0.041);
+            assert_eq!(
+                other_resonance(&record, 20_000.0, &[(590.0, 0.041)]),
+                None,
+                "{seed}"
+            );
         }
     }
 
