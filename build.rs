@@ -1,7 +1,11 @@
-//! Says which commit and target a build is of, for `torqcomp --version`.
+//! Says which commit and target a build is of, for `torqcomp --version`, and packs the schemas of `torqcomp schema`.
 
+use std::io::Write;
 use std::path::Path;
 use std::process::Command;
+
+use flate2::Compression;
+use flate2::write::DeflateEncoder;
 
 /// What decides the program; a change in it that is not committed is said.
 const SOURCES: [&str; 5] = ["src", "crates", "build.rs", "Cargo.toml", "Cargo.lock"];
@@ -9,8 +13,12 @@ const SOURCES: [&str; 5] = ["src", "crates", "build.rs", "Cargo.toml", "Cargo.lo
 /// Letters of a commit that are shown.
 const SHOWN: usize = 12;
 
+/// The JSON Schemas of the documents.
+const SCHEMAS: &str = "src/commands/schema";
+
 fn main() {
     let variable = |name: &str| std::env::var(name).unwrap_or_default();
+    pack_schemas(Path::new(&variable("OUT_DIR")));
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rustc-env=TORQCOMP_TARGET={}", variable("TARGET"));
     // A commit changes the version, and so all that is built after it. Builds without optimisation are for work in between.
@@ -21,6 +29,26 @@ fn main() {
         false => "debug build".to_owned(),
     };
     println!("cargo::rustc-env=TORQCOMP_ORIGIN={origin}");
+}
+
+/// Compresses the schemas, which would be 2 % of a binary.
+fn pack_schemas(folder: &Path) {
+    println!("cargo::rerun-if-changed={SCHEMAS}");
+    for entry in std::fs::read_dir(SCHEMAS).expect("the folder of the schemas") {
+        let path = entry.expect("a readable folder").path();
+        let Some(name) = path
+            .file_name()
+            .filter(|_| path.extension().is_some_and(|e| e == "json"))
+        else {
+            continue;
+        };
+        let mut packed = DeflateEncoder::new(Vec::new(), Compression::best());
+        let text = std::fs::read(&path).expect("a readable schema");
+        packed.write_all(&text).expect("memory takes all");
+        let packed = packed.finish().expect("memory takes all");
+        std::fs::write(folder.join(name).with_extension("json.z"), packed)
+            .expect("a writable folder");
+    }
 }
 
 /// The commit that `cargo package` wrote down.

@@ -3,6 +3,9 @@
 #[cfg(test)]
 pub(crate) mod types;
 
+use std::io::Read;
+
+use flate2::read::DeflateDecoder;
 use serde_json::Value;
 
 use super::Outcome;
@@ -35,14 +38,23 @@ pub(crate) struct DocumentKind {
     pub(crate) name: &'static str,
     /// Name and version as in the document itself.
     pub(crate) schema: &'static str,
-    /// The JSON Schema (2020-12), generated from the types.
-    pub(crate) text: &'static str,
+    /// The JSON Schema (2020-12), generated from the types; compressed.
+    packed: &'static [u8],
 }
 
 impl DocumentKind {
+    /// The JSON Schema.
+    pub(crate) fn text(&self) -> String {
+        let mut text = String::new();
+        DeflateDecoder::new(self.packed)
+            .read_to_string(&mut text)
+            .expect("build.rs packed a text");
+        text
+    }
+
     /// Description in one sentence.
     pub(crate) fn about(&self) -> String {
-        let schema: Option<Value> = serde_json::from_str(self.text).ok();
+        let schema: Option<Value> = serde_json::from_str(&self.text()).ok();
         let about = schema
             .as_ref()
             .and_then(|schema| schema["description"].as_str());
@@ -56,7 +68,7 @@ macro_rules! documents {
         pub(crate) const DOCUMENTS: &[DocumentKind] = &[$(DocumentKind {
             name: $name,
             schema: $schema,
-            text: include_str!(concat!("schema/", $name, ".json")),
+            packed: include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".json.z")),
         }),*];
     };
 }
@@ -81,7 +93,7 @@ documents! {
 /// Runs the verb.
 pub fn run(args: &Schema) -> Result<Outcome, Failure> {
     let text = match &args.document {
-        Some(name) => find(name)?.text.to_owned(),
+        Some(name) => find(name)?.text(),
         None => list(),
     };
     let mut output = args.result.open(&[])?;

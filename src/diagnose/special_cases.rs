@@ -14,9 +14,9 @@ use crate::parallel::parallel;
 const SPECIAL_CASE: FitEffort = FitEffort::full(15);
 /// Ratio of the sum of squares of a general case to that of the special one, above which the special one needs no
 /// refit.
-const MUCH_LESS: f64 = 0.9;
+const LESS: f64 = 0.99;
 
-/// Refits the forms whose residual is much larger than that of the best general case, if that gains at least the given
+/// Refits the forms whose residual is larger than that of the best general case, if that gains at least the given
 /// amount.
 pub fn fit_special_cases(
     forms: &[EffectForm],
@@ -33,7 +33,7 @@ pub fn fit_special_cases(
         let others = (0..forms.len()).filter(|g| forms[k].is_special_case_of(&forms[*g]));
         let promising = others.filter(|g| without - sum(*g) >= least_gain);
         let best = promising.min_by(|a, b| sum(*a).total_cmp(&sum(*b)))?;
-        (sum(best) < MUCH_LESS * sum(k)).then_some(best)
+        (sum(best) < LESS * sum(k)).then_some(best)
     };
     let anew: Vec<(usize, usize)> = (0..forms.len())
         .filter_map(|k| Some((k, general(k)?)))
