@@ -58,6 +58,7 @@ pub fn low_pass(
     forward
         .process(&mut padded, &mut spectrum)
         .expect("buffers were made for this length");
+    drop(forward);
     for (k, bin) in spectrum.iter_mut().enumerate() {
         let ratio = k as f64 * rate_hz / size as f64 / corner_hz;
         *bin *= 1.0 / (1.0 + ratio.powi(2 * order as i32)) / size as f64;

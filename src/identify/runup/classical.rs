@@ -5,7 +5,6 @@ use torqcomp_dsp::zero_phase::low_pass;
 use torqcomp_model::fit::linear;
 
 use super::FreeRun;
-use super::directions::Directions;
 use crate::failure::Failure;
 use crate::identify::{Comparison, FitQuality, Motion, NamedEstimate, rms};
 use crate::print::short;
@@ -17,7 +16,7 @@ const ORDER: u32 = 4;
 /// needs no differences.
 pub(super) fn identify(
     run: &FreeRun,
-    directions: &Directions,
+    is_both: bool,
     half: usize,
     split: bool,
     names: &[(&'static str, &'static str)],
@@ -28,14 +27,14 @@ pub(super) fn identify(
     let rate = run.rate_hz;
     let corner_hz = (rate / half as f64).min(0.2 * rate);
     let smooth = |samples: &[f64]| low_pass(samples, rate, corner_hz, ORDER);
-    let columns = columns(run, directions, split, smooth)?;
-    let effort = smooth(run.effort)?;
     let step = (rate / (4.0 * corner_hz)).floor().max(1.0) as usize;
+    let count = run.motion.len();
     // Without the ends, where differences and filters are inexact.
-    let edge = (2 * half).min(effort.len() / 10);
-    let rows: Vec<usize> = (edge..effort.len() - edge).step_by(step).collect();
-    let design = DMatrix::from_fn(rows.len(), columns.len(), |r, c| columns[c][rows[r]]);
-    let right: Vec<f64> = rows.iter().map(|r| effort[*r]).collect();
+    let edge = (2 * half).min(count / 10);
+    let rows: Vec<usize> = (edge..count - edge).step_by(step).collect();
+    let columns = columns(run, (is_both, split), &rows, smooth)?;
+    let design = DMatrix::from_fn(rows.len(), columns.len(), |r, c| columns[c][r]);
+    let right = at(&rows, &smooth(run.effort)?);
     let fit = linear::solve(&design, &right, None, false)?;
     let left = rms(&fit.residuals);
     let constant = |(i, (name, unit)): (usize, &(&str, &'static str))| {
@@ -56,40 +55,44 @@ pub(super) fn identify(
     }))
 }
 
-/// Terms of the equation from filtered samples.
+/// Values at some rows.
+fn at(rows: &[usize], samples: &[f64]) -> Vec<f64> {
+    rows.iter().map(|r| samples[*r]).collect()
+}
+
+/// Terms of the equation from filtered samples at some rows.
 fn columns(
     run: &FreeRun,
-    directions: &Directions,
-    split: bool,
+    (is_both, split): (bool, bool),
+    rows: &[usize],
     smooth: impl Fn(&[f64]) -> Result<Vec<f64>, torqcomp_dsp::Error>,
 ) -> Result<Vec<Vec<f64>>, Failure> {
     let rate = run.rate_hz;
-    let filtered = smooth(run.motion)?;
-    let speed = match run.kind {
-        Motion::Displacement => differences(&filtered, rate),
-        _ => filtered,
-    };
-    let mut columns = vec![differences(&speed, rate)];
+    let mut speed = smooth(run.motion)?;
+    if run.kind == Motion::Displacement {
+        speed = (0..speed.len())
+            .map(|i| difference(&speed, i, rate))
+            .collect();
+    }
+    let changes = rows.iter().map(|r| difference(&speed, *r, rate));
+    let mut columns = vec![changes.collect()];
+    let speeds = at(rows, &speed);
     if split {
-        columns.push(speed.iter().map(|v| v.max(0.0)).collect());
-        columns.push(speed.iter().map(|v| v.min(0.0)).collect());
+        columns.push(speeds.iter().map(|v| v.max(0.0)).collect());
+        columns.push(speeds.iter().map(|v| v.min(0.0)).collect());
     } else {
-        columns.push(speed.clone());
+        columns.push(speeds);
     }
-    if directions.both() {
-        let signs: Vec<f64> = speed.iter().map(|v| v.signum()).collect();
-        columns.push(smooth(&signs)?);
+    if is_both {
+        speed.iter_mut().for_each(|v| *v = v.signum());
+        columns.push(at(rows, &smooth(&speed)?));
     }
-    columns.push(vec![1.0; speed.len()]);
+    columns.push(vec![1.0; rows.len()]);
     Ok(columns)
 }
 
-fn differences(samples: &[f64], rate_hz: f64) -> Vec<f64> {
-    let last = samples.len() - 1;
-    (0..=last)
-        .map(|i| {
-            let (from, to) = (i.saturating_sub(1), (i + 1).min(last));
-            (samples[to] - samples[from]) * rate_hz / (to - from) as f64
-        })
-        .collect()
+/// Central difference at a sample, one-sided at the ends.
+fn difference(samples: &[f64], i: usize, rate_hz: f64) -> f64 {
+    let (from, to) = (i.saturating_sub(1), (i + 1).min(samples.len() - 1));
+    (samples[to] - samples[from]) * rate_hz / (to - from) as f64
 }

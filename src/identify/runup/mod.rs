@@ -111,7 +111,10 @@ pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification,
     present::method(&mut result, run, &fitted);
     present::draw(&mut result, run, &fitted);
     present::warnings(&mut result, run, &directions, options, &fitted);
-    let classical = classical::identify(run, &directions, half, split, &names)?;
+    let is_both = directions.both();
+    // The comparison takes the most memory.
+    drop((directions, fitted));
+    let classical = classical::identify(run, is_both, half, split, &names)?;
     result.comparisons.extend(classical);
     Ok(result)
 }
