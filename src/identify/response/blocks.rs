@@ -16,6 +16,8 @@ use crate::print::{plural, rounded, short};
 /// Blocks of all records, on a common frequency grid.
 pub(super) struct Set {
     pub blocks: Vec<Block>,
+    /// Number of lines, from 0 to half the sampling rate.
+    pub lines: usize,
     /// Powers summed over all blocks.
     pub powers: Powers,
     /// Record of each block.
@@ -37,6 +39,7 @@ impl Set {
         let (record, blocks): (Vec<usize>, Vec<Block>) = cut.into_iter().unzip();
         Self {
             powers: Powers::of(blocks.iter(), 0..usize::MAX),
+            lines: blocks.first().map_or(0, |block| block.applied.len()),
             blocks,
             record,
             step_hz,
@@ -45,6 +48,20 @@ impl Set {
             of_differences: false,
             is_periodic: false,
             strokes: Vec::new(),
+        }
+    }
+
+    /// Drops the lines of segments of noise from a number on, which may be most of the memory. Those of the single
+    /// blocks of other excitations show the error of the force.
+    pub fn keep_lines(&mut self, end: usize) {
+        if self.window != Window::Hann {
+            return;
+        }
+        for block in &mut self.blocks {
+            for channel in [&mut block.applied, &mut block.measured] {
+                channel.truncate(end);
+                channel.shrink_to_fit();
+            }
         }
     }
 

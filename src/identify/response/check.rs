@@ -83,7 +83,7 @@ pub(super) const LEADS: &str = "the measured signal leads the applied one at nea
 
 /// Whether a mode lies above all frequencies of the record, as with swapped channels.
 pub(super) fn is_out_of_reach(set: &Set, fitted: &Modal) -> bool {
-    let highest = std::f64::consts::TAU * set.step_hz * (set.blocks[0].applied.len() - 1) as f64;
+    let highest = std::f64::consts::TAU * set.step_hz * (set.lines - 1) as f64;
     let mut poles = fitted.poles.iter();
     poles.any(|pole| pole.rate_per_s.hypot(pole.omega_rad_per_s) > highest)
 }

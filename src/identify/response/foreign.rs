@@ -68,7 +68,7 @@ pub(super) fn mark(modal: &mut Modal, covariance: &Covariance, set: &Set) {
 }
 
 fn kinds(modal: &Modal, covariance: &Covariance, set: &Set) -> Vec<Option<Foreign>> {
-    let highest_hz = set.step_hz * (set.blocks[0].applied.len() - 1) as f64;
+    let highest_hz = set.step_hz * (set.lines - 1) as f64;
     let strongest = (0..modal.poles.len()).max_by(|a, b| {
         let size = |k: usize| modal.residue(k).0.norm() / modal.poles[k].rate_per_s.max(1e-12);
         let rings =

@@ -15,10 +15,17 @@ pub(super) type Lines = std::ops::Range<usize>;
 /// Minimum power of an excited line, relative to the strongest.
 const EXCITES: f64 = 1e-3;
 
+/// The blocks with the lines that are used, and the lines of the band.
+pub(super) fn in_band(mut set: Set, options: &ResponseOptions) -> Result<(Set, Lines), Failure> {
+    let lines = band(&set, options)?;
+    set.keep_lines(lines.end);
+    Ok((set, lines))
+}
+
 /// The given band, or the excited lines. A step has most of its power at the lowest lines, whatever it excites; so for
 /// transients the power of their differences counts, and at most as many lines as can be fitted.
-pub(super) fn band(set: &Set, options: &ResponseOptions) -> Result<Lines, Failure> {
-    let lines = set.blocks[0].applied.len();
+fn band(set: &Set, options: &ResponseOptions) -> Result<Lines, Failure> {
+    let lines = set.lines;
     let frf = set.powers.response(Estimator::H1);
     let (from, to) = match options.band_hz {
         Some((from, to)) => (

@@ -93,7 +93,7 @@ impl ResponseOptions {
 pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identification, Failure> {
     let mut result = Identification::new("response");
     let set = blocks::blocks(records, options, &mut result)?;
-    let lines = lines::band(&set, options)?;
+    let (set, lines) = lines::in_band(set, options)?;
     let leads = check::leads(&set, &lines, options.order);
     let data = lines::data(&set.powers, &set, &lines, options);
     // The transforms of whole records take about as long as the search for the number of modes.

@@ -111,7 +111,7 @@ pub(super) fn output_rms(set: &Set, lines: &Lines) -> f64 {
                 .sum::<f64>()
         })
         .sum();
-    let length = 2.0 * (set.blocks[0].applied.len() as f64 - 1.0);
+    let length = 2.0 * (set.lines as f64 - 1.0);
     (2.0 * power / set.blocks.len() as f64).sqrt() / length
 }
 

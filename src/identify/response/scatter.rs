@@ -229,7 +229,7 @@ fn from_force(
     let columns = solved.free.len();
     let mut sum = DMatrix::zeros(columns, columns);
     let power = applied_power(set, lines);
-    let length = 2 * (set.blocks[0].applied.len() - 1);
+    let length = 2 * (set.lines - 1);
     for (b, stroke) in &set.strokes {
         let applied = &set.blocks[*b].applied[lines.clone()];
         let weighted = |k: usize| match power[k] > 0.0 {
@@ -363,7 +363,7 @@ fn variance(set: &Set, line: usize) -> f64 {
 fn gathered(set: &Set, lines: &Lines, solved: &Linearised, sizes: &[f64]) -> DMatrix<f64> {
     let (count, columns) = (lines.len(), solved.free.len());
     let slope = |k: usize, p: usize| solved.slope(k, p);
-    let length = 2 * (set.blocks[0].applied.len() - 1);
+    let length = 2 * (set.lines - 1);
     let reach = match set.window {
         Window::None => 0,
         Window::Hann => 2,

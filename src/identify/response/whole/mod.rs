@@ -175,11 +175,12 @@ impl Spectra {
         let lines = from.max(1)..(to + 1).min(count / 2 + 1);
         // One after the other: a transform takes three times the memory of its channel.
         let spectrum = |channel: &[f64]| lines_of(&channel[..count], lines.clone());
+        let (applied, measured) = (spectrum(record.applied), spectrum(record.measured));
         Self {
+            applied,
+            measured,
             omega: lines.clone().map(|k| step * k as f64).collect(),
             weight: vec![1.0; lines.len()],
-            applied: spectrum(record.applied),
-            measured: spectrum(record.measured),
         }
     }
 
