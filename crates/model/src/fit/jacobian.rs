@@ -16,9 +16,6 @@ pub(super) struct Derivatives<'a> {
 /// Number of points at which the residuals are evaluated at once.
 const AT_ONCE: usize = 4;
 
-/// A column of the Jacobian, and the evaluations that it took.
-type Column = (Vec<f64>, usize);
-
 /// Columns of the free parameters, and the number of evaluations.
 pub(super) fn jacobian(
     evaluated: &Evaluated,
@@ -37,12 +34,7 @@ pub(super) fn jacobian(
         }
         return finite(chosen).map(|matrix| (matrix, 1));
     }
-    let columns = columns(evaluated, how, values, at)?;
-    let evaluations = columns.iter().map(|(_, count)| count).sum();
-    let mut matrix = DMatrix::zeros(at.len(), how.free.len());
-    for (j, (column, _)) in columns.into_iter().enumerate() {
-        matrix.column_mut(j).copy_from_slice(&column);
-    }
+    let (matrix, evaluations) = by_differences(evaluated, how, values, at)?;
     finite(matrix).map(|matrix| (matrix, evaluations))
 }
 
@@ -98,13 +90,13 @@ struct Ends {
     width: f64,
 }
 
-/// All columns; points are evaluated in batches, to limit memory.
-fn columns(
+/// All columns, and the number of evaluations; points are evaluated in batches, to limit memory.
+fn by_differences(
     evaluated: &Evaluated,
     how: &Derivatives,
     values: &[f64],
     at: &[f64],
-) -> Result<Vec<Column>, FitError> {
+) -> Result<(DMatrix<f64>, usize), FitError> {
     let ends: Vec<Ends> = how
         .free
         .iter()
@@ -113,18 +105,20 @@ fn columns(
     let points: Vec<Vec<f64>> = ends.iter().flat_map(|e| e.points.clone()).collect();
     let some = points.chunks(AT_ONCE);
     let mut residuals = some.flat_map(|some| evaluated.residuals_of_each(some));
-    let mut column = |ends: &Ends| {
+    let mut matrix = DMatrix::zeros(at.len(), how.free.len());
+    for (mut column, ends) in matrix.column_iter_mut().zip(&ends) {
         let mut next = || residuals.next().expect("one for each point");
         let above = next()?;
         let below = match ends.points.len() {
             1 => None,
             _ => Some(next()?),
         };
-        let below = below.as_deref().unwrap_or(at);
-        let slope = above.iter().zip(below).map(|(a, b)| (a - b) / ends.width);
-        Ok((slope.collect(), ends.points.len()))
-    };
-    ends.iter().map(&mut column).collect()
+        let pairs = above.iter().zip(below.as_deref().unwrap_or(at));
+        for (slope, (a, b)) in column.iter_mut().zip(pairs) {
+            *slope = (a - b) / ends.width;
+        }
+    }
+    Ok((matrix, points.len()))
 }
 
 impl Derivatives<'_> {
