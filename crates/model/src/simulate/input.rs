@@ -13,7 +13,7 @@ use super::between::Between;
 /// fade out, so that the transform, which treats it as periodic, sees no step. The difference between the extension
 /// and the true history acts as an initial state of the stand.
 pub struct Excitation {
-    samples: Vec<f64>,
+    samples: Arc<Vec<f64>>,
     rate_hz: f64,
     start_s: f64,
     lead: usize,
@@ -57,7 +57,7 @@ impl Excitation {
         periods: [Option<usize>; 2],
     ) -> Self {
         let input = Self {
-            samples,
+            samples: Arc::new(samples),
             rate_hz,
             start_s,
             lead,
@@ -212,8 +212,16 @@ impl Excitation {
         }
     }
 
-    /// Interpolation of the continuous input by zero-padding its spectrum.
+    /// Interpolation of the continuous input.
     fn refine(&self, of: &[Complex64], substeps: usize) -> Vec<f64> {
+        match substeps <= AT_ONCE {
+            true => self.refine_at_once(of, substeps),
+            false => self.refine_by_phases(of, substeps),
+        }
+    }
+
+    /// Interpolation by zero-padding the spectrum.
+    fn refine_at_once(&self, of: &[Complex64], substeps: usize) -> Vec<f64> {
         let long = self.total * substeps;
         let plan = torqcomp_fourier::inverse(long);
         let mut spectrum = plan.make_input_vec();
@@ -233,7 +241,40 @@ impl Excitation {
             .map(|x| x * scale)
             .collect()
     }
+
+    /// The same by shifting the record by each fraction of a sample, which needs no memory beside the result.
+    fn refine_by_phases(&self, of: &[Complex64], substeps: usize) -> Vec<f64> {
+        let first = (self.lead + self.total) * substeps - 1;
+        let mut fine = vec![0.0; self.nodes(substeps)];
+        let mut spectrum = self.backward.make_input_vec();
+        let mut shifted = self.backward.make_output_vec();
+        let scale = 1.0 / self.total as f64;
+        for phase in 0..substeps {
+            let part = phase as f64 / substeps as f64;
+            let turn = std::f64::consts::TAU * part / self.total as f64;
+            for (line, (to, from)) in spectrum.iter_mut().zip(of).enumerate() {
+                *to = from * Complex64::cis(turn * line as f64);
+            }
+            spectrum[0].im = 0.0;
+            if self.total.is_multiple_of(2)
+                && let Some(last) = spectrum.last_mut()
+            {
+                // The mean of both signs of frequency.
+                last.im = 0.0;
+            }
+            let _ = self.backward.process(&mut spectrum, &mut shifted);
+            let own = (phase + substeps - first % substeps) % substeps;
+            for node in (own..fine.len()).step_by(substeps) {
+                fine[node] = shifted[(first + node) / substeps % self.total] * scale;
+            }
+        }
+        fine
+    }
 }
+
+/// Number of steps per sample up to which the fine grid is one transform, which takes five times the memory of the
+/// grid.
+const AT_ONCE: usize = 8;
 
 /// Extends a record at its ends, fading to zero over `lead` samples: periodically at an end with a period, by point
 /// reflection otherwise.
@@ -307,5 +348,44 @@ fn quick_length(least: usize) -> usize {
             return length;
         }
         length += 2;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nodes of a periodic sum of lines against the lines themselves, below and above [`AT_ONCE`]; the line at half the
+    /// rate is a cosine.
+    #[test]
+    fn every_node_is_on_the_lines_through_the_samples() {
+        let turn = |samples: f64| std::f64::consts::TAU * samples / 60.0;
+        let line = |t: f64| {
+            0.3 + turn(7.0 * t).cos() - 0.5 * turn(23.0 * t).sin() + 0.2 * turn(30.0 * t).cos()
+        };
+        let samples: Vec<f64> = (0..60).map(|i| line(f64::from(i))).collect();
+        for substeps in [3, 8, 9, 24] {
+            let input = Excitation::periodic(samples.clone(), 100.0, 0.0, substeps);
+            assert_eq!(input.fine().len(), 60 * substeps + 3);
+            for (node, value) in input.fine().iter().enumerate() {
+                let there = line((node as f64 - 1.0) / substeps as f64);
+                assert!(
+                    (value - there).abs() < 1e-12,
+                    "{substeps}, {node}: {value} {there}"
+                );
+            }
+        }
+    }
+
+    /// The same with continued ends.
+    #[test]
+    fn both_ways_to_refine_agree() {
+        let samples: Vec<f64> = (0..501).map(|i| f64::from(i * i % 97) - 48.0).collect();
+        let input = Excitation::new(samples, 100.0, 0.0, 12);
+        let at_once = input.refine_at_once(&input.spectrum, 12);
+        assert_eq!(input.fine().len(), at_once.len());
+        for (one, other) in input.fine().iter().zip(&at_once) {
+            assert!((one - other).abs() < 1e-11, "{one} {other}");
+        }
     }
 }
