@@ -4,6 +4,7 @@ mod checks;
 mod decays;
 mod declared;
 mod loads;
+mod memory;
 mod page;
 mod read;
 mod refined;

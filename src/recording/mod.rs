@@ -47,6 +47,7 @@ pub use fill::FilledSpan;
 pub(crate) use memory_stream::{check_cells, check_holes, check_size};
 pub(crate) use message_stream::MessageOrigin;
 pub(crate) use messages::times as message_times;
+pub(crate) use room::MemoryNeed;
 pub(crate) use spool::Spool;
 pub(crate) use stamps::{COARSE_STAMPS, StampGrid, is_uniform, rates_of, same_stamps};
 pub(crate) use stream::ChannelStream;

@@ -1,4 +1,4 @@
-//! Check that the numbers of a text fit in memory.
+//! Check that a job fits in memory.
 
 use super::text::TextFile;
 use crate::failure::{ErrorCode, Failure};
@@ -19,6 +19,42 @@ struct Room {
     allowed: Option<u64>,
 }
 
+/// Memory that a job takes, in bytes.
+pub(crate) struct MemoryNeed<'a> {
+    /// The input, for messages.
+    pub(crate) name: &'a str,
+    /// What takes it, in the warning, after the name, and in the failure.
+    pub(crate) takes: [&'a str; 2],
+    /// What to do instead.
+    pub(crate) remedy: &'a str,
+    pub(crate) least: u64,
+    pub(crate) usual: u64,
+}
+
+impl MemoryNeed<'_> {
+    /// Warns if it is more than is free.
+    ///
+    /// # Errors
+    /// If it exceeds the limit of the process.
+    pub(crate) fn look(&self) -> Result<(), Failure> {
+        if let Some(text) = Room::of_system().said_of(self)? {
+            print::note(&format!("torqcomp: {text}\n"));
+        }
+        Ok(())
+    }
+
+    /// Reading a number of numbers of a text.
+    fn of_numbers(numbers: u64, name: &str) -> MemoryNeed<'_> {
+        MemoryNeed {
+            name,
+            takes: [" is read as a whole, which takes", "its numbers take"],
+            remedy: "cut the file into parts",
+            least: LEAST.saturating_mul(numbers),
+            usual: USUAL.saturating_mul(numbers),
+        }
+    }
+}
+
 /// Warns if the numbers of a text, up to `most`, will take more memory than is free.
 ///
 /// # Errors
@@ -29,10 +65,7 @@ pub(super) fn look(input: &Input, text: &TextFile, most: usize) -> Result<(), Fa
     };
     let length = std::fs::metadata(path).map_or(0, |meta| meta.len());
     let numbers = text.numbers_in(length).min(most as u64);
-    if let Some(text) = Room::of_system().said_of(numbers, &input.name())? {
-        print::note(&format!("torqcomp: {text}\n"));
-    }
-    Ok(())
+    MemoryNeed::of_numbers(numbers, &input.name()).look()
 }
 
 impl Room {
@@ -44,16 +77,21 @@ impl Room {
         }
     }
 
-    fn said_of(self, numbers: u64, name: &str) -> Result<Option<String>, Failure> {
-        let least = LEAST.saturating_mul(numbers);
-        let usual = USUAL.saturating_mul(numbers);
+    fn said_of(self, need: &MemoryNeed) -> Result<Option<String>, Failure> {
+        let MemoryNeed {
+            name,
+            takes: [takes, take],
+            remedy,
+            least,
+            usual,
+        } = *need;
         let gb = |bytes: u64| print::rounded(bytes as f64 * 1e-9, 2);
         if let Some(allowed) = self.allowed.filter(|allowed| least > *allowed) {
             return Err(Failure::failed(
                 ErrorCode::NotEnoughRoom,
                 format_args!(
-                    "its numbers take at least {} GB of memory, and this process may have {} GB; raise the limit \
-                     (ulimit -v), or cut the file into parts",
+                    "{take} at least {} GB of memory, and this process may have {} GB; raise the limit (ulimit -v), or \
+                     {remedy}",
                     gb(least),
                     gb(allowed)
                 ),
@@ -63,8 +101,7 @@ impl Room {
         let is_short = |free: &u64| usual > *free;
         Ok(self.free.filter(is_short).map(|free| {
             format!(
-                "{name} is read as a whole, which takes about {} GB of memory, and {} GB are free; if it fails, cut the file \
-                 into parts",
+                "{name}{takes} about {} GB of memory, and {} GB are free; if it fails, {remedy}",
                 gb(usual),
                 gb(free)
             )
@@ -103,18 +140,30 @@ mod tests {
             free: Some(3_000_000_000),
             allowed: Some(2_000_000_000),
         };
-        assert_eq!(room.said_of(120_000_000, "a.csv"), Ok(None));
+        assert_eq!(
+            room.said_of(&MemoryNeed::of_numbers(120_000_000, "a.csv")),
+            Ok(None)
+        );
         // 0.15 thousand million numbers of 24 bytes.
-        let said = room.said_of(150_000_000, "a.csv").unwrap().unwrap();
+        let said = room
+            .said_of(&MemoryNeed::of_numbers(150_000_000, "a.csv"))
+            .unwrap()
+            .unwrap();
         assert!(
             said.contains("about 3.6 GB of memory, and 3 GB are free"),
             "{said}"
         );
-        let refused = room.said_of(300_000_000, "a.csv").unwrap_err().to_string();
+        let refused = room
+            .said_of(&MemoryNeed::of_numbers(300_000_000, "a.csv"))
+            .unwrap_err()
+            .to_string();
         assert!(
             refused.contains("at least 2.4 GB of memory, and this process may have 2 GB"),
             "{refused}"
         );
-        assert_eq!(Room::default().said_of(u64::MAX, "a.csv"), Ok(None));
+        assert_eq!(
+            Room::default().said_of(&MemoryNeed::of_numbers(u64::MAX, "a.csv")),
+            Ok(None)
+        );
     }
 }

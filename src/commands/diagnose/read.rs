@@ -7,7 +7,7 @@ use torqcomp_model::simulate::Excitation;
 use torqcomp_model::{Dimension, Estimate, UnitSystem};
 
 use super::declared::{declared, declared_effects, measures, recorder, several, torques_unknown};
-use super::{decays, loads, running};
+use super::{decays, loads, memory, running};
 use crate::cli::Diagnose;
 use crate::commands::convert;
 use crate::diagnose::{
@@ -95,6 +95,7 @@ pub struct ReadCase {
 /// Reads all records, and the declarations of the stand file about them.
 pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<ReadCase, Failure> {
     let [train, holdout, loads, running] = all_pairs(args)?;
+    memory::must_fit(args, train.iter().chain(&holdout))?;
     let last_is_held_out = args.train.is_empty() && args.held_out_files().is_empty();
     let first = &train[0];
     let (units, is_calibrated) = units(first, stand, first.applied.is_some() || !loads.is_empty());
