@@ -33,7 +33,7 @@ fn uncertain_rms(model: &ScoredModel, free: &[usize], covariance: &DMatrix<f64>)
     let fitted = &model.fitted;
     let (_, terms) = fitted.structure.model(&fitted.values);
     let (mut sum, mut count) = (0.0, 0);
-    for residual in model.compared.iter() {
+    for residual in model.compared().iter() {
         let nuisance = fitted.nuisance_under_load(&residual.record, &terms);
         let columns = derivatives(fitted, &residual.record, &terms, &nuisance)?;
         for (i, one) in free.iter().enumerate() {
@@ -68,7 +68,7 @@ fn coloured_covariance(
     let free: Vec<usize> = (0..fitted.values.len())
         .filter(|k| fitted.std[*k].is_some() && moves(*k))
         .collect();
-    let rows: usize = model.train.iter().map(|r| r.samples.len()).sum();
+    let rows = model.train_count();
     let mut jacobian = DMatrix::zeros(rows, free.len());
     for (mut column, k) in jacobian.column_iter_mut().zip(&free) {
         let whole = each.iter().flat_map(|columns| &columns[*k]);
@@ -83,7 +83,7 @@ fn coloured_covariance(
             .iter()
             .map(|r| Some(fitted.residual(r)?.samples))
             .collect(),
-        false => Some(model.train.iter().map(|r| r.samples.clone()).collect()),
+        false => Some(model.train().iter().map(|r| r.samples.clone()).collect()),
     };
     let residuals = residuals?;
     let all = 0..residuals.len();

@@ -50,20 +50,22 @@ fn passing(tried: &[CandidateFit]) -> impl Iterator<Item = usize> + '_ {
 fn choose(tried: &[CandidateFit]) -> Option<(usize, Vec<usize>)> {
     let best =
         passing(tried).min_by(|a, b| criterion(tried, *a).total_cmp(&criterion(tried, *b)))?;
+    // It is compared with each of the others.
+    let model = tried[best].model.clone()?.with_samples();
     let tied: Vec<usize> = passing(tried)
-        .filter(|k| is_tied(tried, *k, best))
+        .filter(|k| *k == best || is_tied(tried, *k, (best, &model)))
         .collect();
     Some((simplest(tried, &tied).unwrap_or(best), tied))
 }
 
 /// Whether an effect is not significantly worse than the best one.
-fn is_tied(tried: &[CandidateFit], k: usize, best: usize) -> bool {
-    let (Some(one), Some(other)) = (&tried[k].model, &tried[best].model) else {
+fn is_tied(tried: &[CandidateFit], k: usize, (best, other): (usize, &ScoredModel)) -> bool {
+    let Some(one) = &tried[k].model else {
         return false;
     };
     let is_nearly = one.parameter_count() < other.parameter_count()
         && one.compared_rms() < NEARLY * other.compared_rms();
-    k == best || one.is_no_worse_than(other) || is_nearly && is_undetermined(&tried[best])
+    one.is_no_worse_than(other) || is_nearly && is_undetermined(&tried[best])
 }
 
 /// Whether the records do not determine a parameter that cannot be zero, such as the frequency of a mode: the effect then

@@ -5,10 +5,11 @@ use serde::Serialize;
 use std::f64::consts::TAU;
 
 use super::SearchState;
+use super::acceptance::evidence;
 use super::blocks::compare;
 use super::record::StandRecord;
 use super::score::{BaseModel, EffectParameter, ScoredModel};
-use super::search::{evidence, listed};
+use super::search::listed;
 use super::starts::change;
 use super::structure::EffectForm;
 use crate::parallel::parallel;
@@ -186,7 +187,8 @@ impl Amount {
 
     /// Ratio of the change of the records to what the search requires of an effect.
     fn evidence(&self, base: &BaseModel, change: &[f64]) -> f64 {
-        let left = base.scored.train.iter().map(|r| r.samples.as_slice());
+        let train = base.scored.train();
+        let left = train.iter().map(|r| r.samples.as_slice());
         let left = left.collect::<Vec<_>>().concat();
         let with: Vec<f64> = left.iter().zip(change).map(|(r, c)| r + c).collect();
         let parameters = self.effect.form.parameters.len();

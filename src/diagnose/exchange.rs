@@ -4,11 +4,12 @@
 use torqcomp_model::effects::{EFFECTS, Effect, Form, Stage};
 
 use super::SearchState;
+use super::acceptance::refusal;
 use super::fit::{FitEffort, fit};
 use super::pairs::best_pairs;
 use super::records::Records;
 use super::score::{BaseModel, ScoredModel};
-use super::search::{FOR_FIRST_EFFECT, SAME, SearchEffort, Workers, listed, refusal, try_effects};
+use super::search::{FOR_FIRST_EFFECT, SAME, SearchEffort, Workers, listed, try_effects};
 use super::special_cases::own_in_form;
 use super::structure::{EffectForm, Structure};
 use crate::parallel::parallel;
@@ -206,7 +207,7 @@ impl ScoredModel {
         let fits = parallel(starts.len(), threads, |k| {
             let (structure, values) = &starts[k];
             let fitted = fit(structure.clone(), values, &training, OTHER_FORM).ok()?;
-            Self::of(fitted, records)
+            Some(Self::of(fitted, records)?.without_samples())
         });
         fits.into_iter().flatten().collect()
     }

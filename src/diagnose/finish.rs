@@ -41,8 +41,8 @@ impl ScoredModel {
     /// The records with steps fine enough that the integration error is below the standard uncertainty of the
     /// modelled record, `σ √(p/n)`; `None` if they already are, and no further modes are left to be fitted in full.
     fn fine_enough(&self, records: &Records) -> Option<Records> {
-        let count: usize = self.train.iter().map(|r| r.samples.len()).sum();
-        let uncertain = self.train_rms() * (self.parameter_count() as f64 / count as f64).sqrt();
+        let count = self.train_count() as f64;
+        let uncertain = self.train_rms() * (self.parameter_count() as f64 / count).sqrt();
         let present = records.substeps();
         let mut fine = records.clone();
         while self.fitted.integrates() && fine.substeps() < FINEST * present {

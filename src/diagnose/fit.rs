@@ -356,8 +356,21 @@ impl FittedModel {
     /// Residual of the fitted model on a record, with only the record's own constants, initial state and phases
     /// estimated. `None` if the motion diverges.
     pub fn residual(&self, record: &StandRecord) -> Option<RecordResidual> {
+        self.residual_by(record, RecordModel::settled)
+    }
+
+    /// The same with the record's initial state as it is.
+    pub fn residual_from(&self, record: &StandRecord) -> Option<RecordResidual> {
+        self.residual_by(record, |model, record| model.residual(record.clone()))
+    }
+
+    fn residual_by(
+        &self,
+        record: &StandRecord,
+        find: impl Fn(&RecordModel, &StandRecord) -> Option<RecordResidual>,
+    ) -> Option<RecordResidual> {
         let model = RecordModel::of(&self.structure, &self.values, self.free);
-        let mut found = model.settled(record)?;
+        let mut found = find(&model, record)?;
         self.restore_amplitudes(&model.terms, &mut found);
         Some(found)
     }

@@ -115,7 +115,7 @@ impl<'a> Near<'a> {
             true => anew,
             false => there,
         };
-        ScoredModel::of(less, records)
+        Some(ScoredModel::of(less, records)?.without_samples())
     }
 
     /// Sum of squares and values of the best start of another form.

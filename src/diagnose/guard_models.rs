@@ -4,10 +4,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use torqcomp_model::effects::{Effect, RIVALS};
 
+use super::acceptance::refusal;
 use super::reason::Reason;
 use super::records::Records;
 use super::score::{BaseModel, EffectParameter, RmsErrors, ScoredModel};
-use super::search::{CandidateFit, Workers, fit_all, refusal};
+use super::search::{CandidateFit, Workers, fit_all};
 use super::structure::EffectForm;
 
 /// A law that is not offered as an effect, fitted.

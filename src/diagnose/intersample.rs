@@ -3,10 +3,10 @@
 
 use torqcomp_model::simulate::Between;
 
+use super::acceptance::refusal;
 use super::record::StandRecord;
 use super::records::Records;
 use super::score::ScoredModel;
-use super::search::refusal;
 use crate::parallel::parallel;
 use torqcomp_dsp::dot;
 

@@ -2,6 +2,7 @@
 //! removed.
 
 use super::SearchState;
+use super::acceptance::no_gain;
 use super::guard_models::GuardModel;
 use super::ladder::Ladder;
 use super::noise_floor::NoiseFloor;
@@ -9,7 +10,7 @@ use super::plain::set_starts;
 use super::reason::Reason;
 use super::records::Records;
 use super::score::ScoredModel;
-use super::search::{CandidateFit, no_gain, reject_all};
+use super::search::{CandidateFit, reject_all};
 use super::structure::EffectForm;
 use crate::failure::{ErrorCode, Failure};
 use crate::parallel::parallel;
@@ -32,19 +33,20 @@ impl SearchState {
             )
         })?;
         self.judge_surface();
-        self.declared = self.declared.as_ref().and_then(|m| self.held_out(m));
+        let declared = self.declared.as_ref().and_then(|m| self.held_out(m));
+        self.declared = declared.map(ScoredModel::without_samples);
         self.judge_candidates(threads);
         self.weigh_again(threads);
         self.suspected = self.suspected.take().and_then(|mut guard| {
-            guard.model = self.held_out(&guard.model)?;
+            guard.model = self.held_out(&guard.model)?.without_samples();
             guard.errors = guard.model.errors();
             Some(guard)
         });
-        self.noise_floor = NoiseFloor::of(&self.before.compared, &self.before.fitted.passage());
+        self.noise_floor = NoiseFloor::of(&self.before.compared(), &self.before.fitted.passage());
         self.tests_before = super::tests(&self.before);
         let without = std::mem::take(&mut self.without);
         self.without = parallel(without.len(), threads, |k| {
-            self.held_out(without[k].as_ref()?)
+            Some(self.held_out(without[k].as_ref()?)?.without_samples())
         });
         let finished = self.after.finished(&self.records, threads);
         let judged = match finished {
@@ -85,7 +87,7 @@ impl SearchState {
     fn judge_candidates(&mut self, threads: usize) {
         let all: Vec<&CandidateFit> = self.rounds.iter().flatten().collect();
         let judged = parallel(all.len(), threads, |k| {
-            self.held_out(all[k].model.as_ref()?)
+            Some(self.held_out(all[k].model.as_ref()?)?.without_samples())
         });
         for (candidate, model) in self.rounds.iter_mut().flatten().zip(judged) {
             candidate.holdout_rms = model.as_ref().map(|model| model.errors().holdout_rms);

@@ -70,7 +70,7 @@ impl ScoredModel {
     pub fn without_each(&self, records: &Records, threads: usize) -> Vec<Option<Self>> {
         parallel(self.fitted.structure.added().len(), threads, |k| {
             let less = self.fitted.with_only(|other| other != k, records)?;
-            Self::of(less, records)
+            Some(Self::of(less, records)?.without_samples())
         })
     }
 
@@ -78,7 +78,7 @@ impl ScoredModel {
     fn each_alone(&self, records: &Records, threads: usize) -> Vec<Option<Self>> {
         parallel(self.fitted.structure.added().len(), threads, |k| {
             let alone = self.fitted.with_only(|other| other == k, records)?;
-            Self::of(alone, records)
+            Some(Self::of(alone, records)?.without_samples())
         })
     }
 

@@ -24,8 +24,8 @@ impl ScoredModel {
     /// Whether the residual of the training records differs from that of the held-out ones in the direction in which
     /// their motions differ, by more than noise of its spectrum does.
     pub fn grows_with_level(&self) -> bool {
-        let Some([train, held]) = RecordPower::of(&self.train)
-            .zip(RecordPower::of(&self.compared))
+        let Some([train, held]) = RecordPower::of(&self.train())
+            .zip(RecordPower::of(&self.compared()))
             .map(<[RecordPower; 2]>::from)
         else {
             return false;

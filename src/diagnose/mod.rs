@@ -4,6 +4,7 @@
 //! records, evaluates the result on the held-out ones ([`judge`]), and summarises it in the [`Diagnosis`]
 //! ([`verdict`]), which is the JSON document of `diagnose`.
 
+mod acceptance;
 mod alignment;
 mod applied_noise;
 mod backbone;
@@ -26,6 +27,7 @@ mod judge;
 mod known_loads;
 mod ladder;
 mod levels;
+mod model_residuals;
 mod moment;
 mod moving_line;
 mod noise_floor;
@@ -235,6 +237,7 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
     let mut found = look(training.clone())?;
     let between = found.other_course(workers.threads);
     if let Some(between) = between {
+        drop(found);
         found = look(training.with_between(between))?;
     }
     let smooth = (found.records.between() != Between::BandLimited)
@@ -263,6 +266,7 @@ impl SearchState {
         plain.initial = records.train.iter().map(|r| r.initial).collect();
         let declared =
             declared.and_then(|declared| ScoredModel::of(declared.model(&plain), &records));
+        let declared = declared.map(ScoredModel::without_samples);
         let before = ScoredModel::of(plain, &records).ok_or_else(|| {
             Failure::failed(
                 ErrorCode::NotIdentifiable,
@@ -273,7 +277,7 @@ impl SearchState {
         let mut found = Self {
             records,
             declared,
-            noise_floor: NoiseFloor::of(&before.compared, &before.fitted.passage()),
+            noise_floor: NoiseFloor::of(&before.compared(), &before.fitted.passage()),
             after: before.clone(),
             before,
             without: Vec::new(),
@@ -306,7 +310,7 @@ impl SearchState {
             old.is_some_and(|old| old.from == NoiseFloorSource::Periods && new.rms < old.rms)
         };
         let passage = self.after.fitted.passage();
-        let new = NoiseFloor::of_residuals(&self.after.compared, &passage);
+        let new = NoiseFloor::of_residuals(&self.after.compared(), &passage);
         if let Some(new) = new.filter(is_lower) {
             self.noise_floor = Some(new);
         }
@@ -351,12 +355,12 @@ impl SearchState {
     /// Significant lines in the residual of a model.
     fn lines_of(&self, model: &ScoredModel) -> Vec<SpectralLine> {
         let to_hz = 0.49 * self.records.rate_hz();
-        let mut lines = lines_of(&model.compared, to_hz, MOST_LINES);
+        let mut lines = lines_of(&model.compared(), to_hz, MOST_LINES);
         lines.retain(|line| line.prominence > PROMINENT);
         lines
     }
 }
 
 fn tests(model: &ScoredModel) -> ResidualTests {
-    ResidualTests::of(&model.compared, &model.fitted.mode())
+    ResidualTests::of(&model.compared(), &model.fitted.mode())
 }

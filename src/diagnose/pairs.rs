@@ -1,5 +1,7 @@
 //! Pairs of effects fitted together: the residual of two effects shows neither clearly while the other is missing.
 
+use nalgebra::DMatrix;
+
 use super::fit::{FitEffort, FittedModel, fit};
 use super::records::Records;
 use super::score::{BaseModel, ScoredModel};
@@ -20,14 +22,28 @@ const EFFORTS: [FitEffort; 3] = [
 /// Limits of the magnitude of an effect in a pair, relative to its magnitude alone.
 const FACTORS: [f64; 2] = [0.1, 2.0];
 
-/// Change of the training residuals by an effect fitted alone.
+/// Number of samples of changes that are kept at a time, and number of changes kept of long records: an inner product
+/// takes two of them, and the others are simulated again for each group of these.
+const KEPT_SAMPLES: usize = 1 << 22;
+const FEWEST_KEPT: usize = 8;
+
+/// Change of the model by an effect fitted alone.
 struct Change {
     effect: EffectForm,
     /// Parameters of the plain stand minus those of the base, and the effect's own.
     plain: Vec<f64>,
     own: Vec<f64>,
-    /// Over all training records, without what the base's own parameters can absorb.
-    samples: Vec<f64>,
+}
+
+/// Inner products of the changes of the training residuals by several effects, each fitted alone, without what the
+/// base's own parameters can absorb.
+struct Products {
+    /// Square of the residual of the base.
+    whole: f64,
+    /// Products of each change with it.
+    along: Vec<f64>,
+    /// Products of the changes with each other, for `k ≤ j`.
+    mixed: DMatrix<f64>,
 }
 
 /// Two changes, and the magnitudes that minimise the residual of both together.
@@ -47,9 +63,9 @@ pub fn best_pairs(
     workers: Workers,
 ) -> Vec<ScoredModel> {
     let changes: Vec<Change> = alone.iter().map(|model| Change::of(base, model)).collect();
-    let residual = base.cleared(|k| base.scored.train[k].samples.clone());
-    let samples = residual.len() as f64;
-    let mut pairs = pairs(&changes, &residual);
+    let samples = base.scored.train_count() as f64;
+    let products = Products::of(base, alone, workers.threads);
+    let mut pairs = pairs(&changes, &products, samples);
     pairs.truncate(FITTED[0]);
     let training = base.scored.fitted.with_initial_states(&records.train);
     let mut fits: Vec<FittedModel> = parallel(pairs.len(), workers.threads, |k| {
@@ -77,6 +93,7 @@ pub fn best_pairs(
     let fits = fits.into_iter();
     let mut scored: Vec<ScoredModel> = fits
         .filter_map(|fit| ScoredModel::of(fit, records))
+        .map(ScoredModel::without_samples)
         .collect();
     sort_by_number(&mut scored, ScoredModel::criterion);
     scored
@@ -92,10 +109,50 @@ impl Change {
             effect: model.fitted.structure.effects[before.fitted.structure.effects.len()],
             plain: plain.map(|(with, without)| with - without).collect(),
             own: values[before.fitted.values.len()..].to_vec(),
-            samples: base.cleared(|k| {
-                let pairs = before.train[k].samples.iter().zip(&model.train[k].samples);
+        }
+    }
+}
+
+impl Products {
+    fn of(base: &BaseModel, alone: &[ScoredModel], threads: usize) -> Self {
+        let before = base.scored.train();
+        let residual = base.cleared(|k| before[k].samples.clone());
+        let change = |model: &ScoredModel| {
+            let after = model.train();
+            base.cleared(|k| {
+                let pairs = before[k].samples.iter().zip(&after[k].samples);
                 pairs.map(|(before, after)| before - after).collect()
-            }),
+            })
+        };
+        let count = alone.len();
+        let mut along = Vec::new();
+        let mut mixed = DMatrix::zeros(count, count);
+        let kept = (KEPT_SAMPLES / residual.len().max(1)).max(FEWEST_KEPT);
+        for first in (0..count).step_by(kept) {
+            let last = (first + kept).min(count);
+            let some = parallel(last - first, threads, |k| change(&alone[first + k]));
+            along.extend(some.iter().map(|one| dot(one, &residual)));
+            let with_some = parallel(count - first, threads, |j| {
+                let again;
+                let other = match some.get(j) {
+                    Some(other) => other,
+                    None => {
+                        again = change(&alone[first + j]);
+                        &again
+                    }
+                };
+                some.iter().map(|one| dot(one, other)).collect::<Vec<_>>()
+            });
+            for (j, products) in with_some.into_iter().enumerate() {
+                for (k, product) in products.into_iter().enumerate() {
+                    mixed[(first + k, first + j)] = product;
+                }
+            }
+        }
+        Self {
+            whole: dot(&residual, &residual),
+            along,
+            mixed,
         }
     }
 }
@@ -124,20 +181,20 @@ impl EffectPair {
 }
 
 /// All pairs of different effects, each in its best forms, in ascending order of the criterion.
-fn pairs(changes: &[Change], residual: &[f64]) -> Vec<EffectPair> {
-    let (count, whole) = (residual.len() as f64, dot(residual, residual));
-    let along: Vec<f64> = changes.iter().map(|c| dot(&c.samples, residual)).collect();
+fn pairs(changes: &[Change], products: &Products, count: f64) -> Vec<EffectPair> {
+    let Products {
+        whole,
+        along,
+        mixed: products,
+    } = products;
     let mut found: Vec<EffectPair> = Vec::new();
     for (k, one) in changes.iter().enumerate() {
-        let own = dot(&one.samples, &one.samples);
+        let own = products[(k, k)];
         for (j, other) in changes.iter().enumerate().skip(k + 1) {
             if one.effect.effect.name == other.effect.effect.name {
                 continue;
             }
-            let (square, mixed) = (
-                dot(&other.samples, &other.samples),
-                dot(&one.samples, &other.samples),
-            );
+            let (square, mixed) = (products[(j, j)], products[(k, j)]);
             let determinant = own * square - mixed * mixed;
             if determinant <= NEARLY_THE_SAME * own * square {
                 continue;

@@ -80,7 +80,7 @@ impl RecordModel {
     }
 
     /// The residual of a record with its present initial state; `None` if the motion diverges.
-    fn residual(&self, record: StandRecord) -> Option<RecordResidual> {
+    pub fn residual(&self, record: StandRecord) -> Option<RecordResidual> {
         let (mut samples, slopes) = match self.chain.is_integrated() {
             true => {
                 let (samples, slopes) = self.residual_and_slopes(&record)?;

@@ -77,7 +77,9 @@ impl Records {
     }
 
     pub fn set_substeps(&mut self, substeps: usize) {
-        self.change_inputs(|input| input.with_substeps(substeps));
+        self.change_inputs(|input| {
+            (input.substeps() != substeps).then(|| input.with_substeps(substeps))
+        });
     }
 
     /// The same records with another waveform of the input between its samples. If other training inputs are present,
@@ -91,7 +93,7 @@ impl Records {
                 (false, true, Between::Held) => Between::BandLimited,
                 _ => between,
             };
-            input.with_between(own)
+            (input.between() != own).then(|| input.with_between(own))
         });
         other
     }
@@ -123,15 +125,15 @@ impl Records {
         }
     }
 
-    /// Changes the inputs; shared ones remain shared.
-    fn change_inputs(&mut self, change: impl Fn(&Excitation) -> Excitation) {
+    /// Changes the inputs for which there is a change; shared ones remain shared.
+    fn change_inputs(&mut self, change: impl Fn(&Excitation) -> Option<Excitation>) {
         let mut made: Vec<(Arc<Excitation>, Arc<Excitation>)> = Vec::new();
         for record in self.all() {
             let known = made.iter().find(|(old, _)| Arc::ptr_eq(old, &record.input));
             let new = match known {
                 Some((_, new)) => new.clone(),
                 None => {
-                    let new = Arc::new(change(&record.input));
+                    let new = change(&record.input).map_or_else(|| record.input.clone(), Arc::new);
                     made.push((record.input.clone(), new.clone()));
                     new
                 }

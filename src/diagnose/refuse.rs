@@ -212,7 +212,7 @@ pub fn relative_error(context: &FitContext, records: &[StandRecord]) -> f64 {
 pub fn plain_stands_apart(before: &ScoredModel) -> Option<[PlainStand; 2]> {
     let train = before.fitted.stand();
     let common = &before.fitted.structure.context;
-    let records: Vec<StandRecord> = before.compared.iter().map(|r| r.record.clone()).collect();
+    let records: Vec<StandRecord> = before.compared().iter().map(|r| r.record.clone()).collect();
     let alone = find_plain(common, Some(train), &records).ok()?;
     let error_alone = relative_error(&alone, &records);
     let is_apart = error_alone < APART * relative_error(&common.at(train), &records);

@@ -165,7 +165,7 @@ impl Diagnosis {
         let is_open = matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained);
         let changed_stand = is_open.then(|| found.settle_change()).flatten();
         let force_surface = (is_open && changed_stand.is_none())
-            .then(|| found.force_surface(threads))
+            .then(|| found.force_surface())
             .flatten();
         let error = ErrorTable::of(&found);
         let levels = ExcitationLevels::of(&found, &error.before);
@@ -237,7 +237,7 @@ impl ErrorTable {
         let (before, after) = (&found.before, &found.after);
         let units = &after.fitted.structure.context.units;
         let size = match &after.fitted.structure.context.held {
-            Some(_) => HeldBody::acting_rms(before.compared.iter().map(|r| &r.record)),
+            Some(_) => HeldBody::acting_rms(before.compared().iter().map(|r| &r.record)),
             None => holdout_rms(before),
         };
         let errors = |model: &ScoredModel| ModelErrors {
@@ -260,7 +260,7 @@ impl ErrorTable {
 /// RMS of the held-out records about their means, without nuisance terms.
 fn holdout_rms(before: &ScoredModel) -> f64 {
     let (mut sum, mut count) = (0.0, 0_usize);
-    for residual in before.compared.iter() {
+    for residual in before.compared().iter() {
         let pairs = residual.modelled.iter().zip(&residual.samples);
         let y: Vec<f64> = pairs.map(|(m, r)| m + r).collect();
         let mean = y.iter().sum::<f64>() / y.len() as f64;

@@ -10,21 +10,21 @@ use torqcomp_model::{Chain, Estimate, StandRun};
 use super::blocks::{Comparison, compare};
 use super::columns::Columns;
 use super::fit::{FitEffort, FittedModel, RecordResidual};
+use super::model_residuals::ModelResiduals;
 use super::record::{Nuisance, NuisanceTerms, StandRecord};
 use super::records::Records;
 use super::several_modes::slopes_of_modes;
 use super::structure::EffectForm;
 use super::unexplained::{raw_residual, raw_residuals};
-use torqcomp_dsp::dot;
 
 /// A fitted model with its residuals.
 #[derive(Clone)]
 pub struct ScoredModel {
     pub fitted: FittedModel,
     /// Residuals on the training records.
-    pub train: Arc<[RecordResidual]>,
-    /// Residuals on the records used for comparison: the training records, or the held-out ones if there are any.
-    pub compared: Arc<[RecordResidual]>,
+    train: ModelResiduals,
+    /// Residuals on the held-out records, if there are any.
+    holdout: Option<ModelResiduals>,
     /// RMS uncertainty of these due to the constants; zero during selection.
     pub uncertain_rms: f64,
 }
@@ -65,11 +65,11 @@ impl ScoredModel {
     pub fn of(fitted: FittedModel, records: &Records) -> Option<Self> {
         let train = fitted.with_initial_states(&records.train);
         let train = train.iter().map(|record| fitted.residual(record));
-        let train: Arc<[_]> = train.collect::<Option<Vec<_>>>()?.into();
+        let train = ModelResiduals::of(train.collect::<Option<_>>()?);
         let trained = Self {
             fitted,
-            compared: train.clone(),
             train,
+            holdout: None,
             uncertain_rms: 0.0,
         };
         match records.holdout.is_empty() {
@@ -91,8 +91,40 @@ impl ScoredModel {
                 None => self.fitted.residual(record),
             }
         });
-        self.compared = residuals.collect::<Option<Vec<_>>>()?.into();
+        self.holdout = Some(ModelResiduals::of(residuals.collect::<Option<_>>()?));
         Some(self)
+    }
+
+    /// Residuals on the training records.
+    pub fn train(&self) -> Arc<[RecordResidual]> {
+        self.train.with_samples(&self.fitted)
+    }
+
+    /// Residuals on the records used for comparison: the training records, or the held-out ones if there are any.
+    pub fn compared(&self) -> Arc<[RecordResidual]> {
+        self.used_for_comparison().with_samples(&self.fitted)
+    }
+
+    fn used_for_comparison(&self) -> &ModelResiduals {
+        self.holdout.as_ref().unwrap_or(&self.train)
+    }
+
+    /// The model without the samples of its residuals, which are simulated again whenever they are needed.
+    pub fn without_samples(mut self) -> Self {
+        self.train.drop_samples();
+        self.holdout
+            .iter_mut()
+            .for_each(ModelResiduals::drop_samples);
+        self
+    }
+
+    /// The model with these samples.
+    pub fn with_samples(mut self) -> Self {
+        self.train.keep_samples(&self.fitted);
+        if let Some(holdout) = &mut self.holdout {
+            holdout.keep_samples(&self.fitted);
+        }
+        self
     }
 
     /// Refits the model with the current step and waveform of the records.
@@ -125,11 +157,11 @@ impl ScoredModel {
     }
 
     pub fn train_rms(&self) -> f64 {
-        rms(&self.train)
+        self.train.rms()
     }
 
     pub fn compared_rms(&self) -> f64 {
-        rms(&self.compared)
+        self.used_for_comparison().rms()
     }
 
     /// Errors in the printed unit.
@@ -148,8 +180,19 @@ impl ScoredModel {
 
     /// All compared residuals, one after the other.
     pub fn compared_samples(&self) -> Vec<f64> {
-        let all = self.compared.iter().map(|r| r.samples.as_slice());
+        let compared = self.compared();
+        let all = compared.iter().map(|r| r.samples.as_slice());
         all.collect::<Vec<_>>().concat()
+    }
+
+    /// Number of samples of the training records.
+    pub fn train_count(&self) -> usize {
+        self.train.count()
+    }
+
+    /// Number of compared samples.
+    pub fn compared_count(&self) -> usize {
+        self.used_for_comparison().count()
     }
 
     /// Number of parameters, including amplitudes of lines and their phases on each training record.
@@ -157,7 +200,7 @@ impl ScoredModel {
         let (_, terms) = self.fitted.structure.model(&self.fitted.values);
         self.fitted.values.len()
             + self.fitted.amplitudes.len()
-            + terms.lines_hz.len() * self.train.len()
+            + terms.lines_hz.len() * self.train.records()
             + terms.drift_half_waves
             + terms.decays_per_s.len()
     }
@@ -185,7 +228,7 @@ impl ScoredModel {
     /// Bayesian information criterion on the training records, up to a constant; smaller is better
     /// (G. Schwarz, Ann. Stat. 6 (1978), 461).
     pub fn criterion(&self) -> f64 {
-        let n = self.train.iter().map(|r| r.samples.len()).sum::<usize>() as f64;
+        let n = self.train.count() as f64;
         2.0 * n * self.train_rms().ln() + self.parameter_count() as f64 * n.ln()
     }
 
@@ -247,12 +290,6 @@ impl ScoredModel {
     }
 }
 
-fn rms(residuals: &[RecordResidual]) -> f64 {
-    let count: usize = residuals.iter().map(|r| r.samples.len()).sum();
-    let sum: f64 = residuals.iter().map(|r| dot(&r.samples, &r.samples)).sum();
-    (sum / count as f64).sqrt()
-}
-
 impl FittedModel {
     /// RMS change of a training record with half the integration step.
     pub fn step_change(&self, first: &StandRecord) -> Option<f64> {
@@ -280,6 +317,7 @@ const STEP: f64 = 1e-6;
 
 impl BaseModel {
     pub fn of(scored: ScoredModel, records: &Records) -> Self {
+        let scored = scored.with_samples();
         let fitted = &scored.fitted;
         let training = fitted.with_initial_states(&records.train);
         let (slopes, nuisance) = training.iter().map(|r| slopes(fitted, r)).unzip();

@@ -8,6 +8,7 @@ use serde::{Serialize, Serializer};
 use torqcomp_model::effects::{EFFECTS, Effect};
 use torqcomp_model::fit::FitError;
 
+use super::acceptance::refusal_for;
 use super::blocks::{Comparison, family_p_values};
 use super::fit::{FitEffort, FittedModel, fit};
 use super::from_best::fit_from_best;
@@ -71,18 +72,6 @@ impl Workers<'_> {
     }
 }
 
-/// Minimum reduction of the sum of squares, in residual variances.
-const LEAST_GAIN: f64 = 40.0;
-/// Minimum relative reduction of the sum of squares.
-const LEAST_SHARE: f64 = 0.005;
-/// Minimum significance of the reduction over the blocks of the records; times the square root of the number of
-/// effects that cause it together, as they fit more of the noise.
-const LEAST_SIGNIFICANCE: f64 = 3.0;
-/// Number of parameters of an effect up to which that holds; in correlated noise, those with more fit
-/// more of it.
-const FEW_PARAMETERS: f64 = 3.0;
-/// One-sided 95 % quantile of the normal distribution.
-const CERTAIN: f64 = 1.645;
 /// Difference of the criterion that counts as a tie.
 pub const SAME: f64 = 4.0;
 /// Number of lines of the residual's spectrum that may be from a shaft.
@@ -169,13 +158,12 @@ pub fn try_effects(
     let lines = residual_lines(base, records);
     let fits = fit_all(base, &forms, &lines, effort, records, workers);
     let mut rest = fits.iter();
-    let mut tried: Vec<CandidateFit> = effects
-        .map(|effect| {
-            let models: Vec<_> = rest.by_ref().take(effect.forms.len()).flatten().collect();
-            CandidateFit::new(effect, &base.scored, &models)
-        })
-        .collect();
-    set_p_values(&mut tried, &base.scored);
+    let tried = effects.map(|effect| {
+        let models: Vec<_> = rest.by_ref().take(effect.forms.len()).flatten().collect();
+        CandidateFit::new(effect, &base.scored, &models)
+    });
+    let (mut tried, gains): (Vec<CandidateFit>, Vec<_>) = tried.unzip();
+    set_p_values(&mut tried, gains);
     super::decide::decide(&mut tried, base, records);
     let fits = fits.into_iter().flatten().collect();
     Round { tried, fits }
@@ -194,9 +182,8 @@ pub fn listed(structure: &Structure) -> impl Iterator<Item = &'static Effect> + 
 }
 
 /// Sets the p-value of each gain, corrected for the number of effects tried.
-fn set_p_values(tried: &mut [CandidateFit], base: &ScoredModel) {
-    let models = tried.iter().filter_map(|c| c.model.as_ref());
-    let comparisons: Vec<Comparison> = models.map(|model| model.against(base)).collect();
+fn set_p_values(tried: &mut [CandidateFit], gains: Vec<Option<Comparison>>) {
+    let comparisons: Vec<Comparison> = gains.into_iter().flatten().collect();
     let fitted = tried.iter_mut().filter(|c| c.model.is_some());
     for (candidate, p) in fitted.zip(family_p_values(&comparisons)) {
         candidate.p_value = p;
@@ -204,11 +191,16 @@ fn set_p_values(tried: &mut [CandidateFit], base: &ScoredModel) {
 }
 
 impl CandidateFit {
-    /// An effect with the fits of its forms.
-    fn new(effect: &'static Effect, base: &ScoredModel, forms: &[&ScoredModel]) -> Self {
+    /// An effect with the fits of its forms; and the best one compared with the model without the effect.
+    fn new(
+        effect: &'static Effect,
+        base: &ScoredModel,
+        forms: &[&ScoredModel],
+    ) -> (Self, Option<Comparison>) {
         let best = forms.iter().copied();
         let best = best.min_by(|a, b| a.criterion().total_cmp(&b.criterion()));
-        let fewest = best.map(|best| {
+        let best = best.map(|best| best.clone().with_samples());
+        let fewest = best.as_ref().map(|best| {
             let count = best.parameter_count();
             let plainer = forms.iter().filter(|form| form.parameter_count() < count);
             let no_worse = plainer.filter(|form| form.is_no_worse_than(best));
@@ -216,13 +208,15 @@ impl CandidateFit {
                 .map(|form| form.parameter_count())
                 .fold(count, usize::min)
         });
-        let model = best.cloned();
+        let gain = best.as_ref().map(|best| best.against(base));
+        let model = best.map(ScoredModel::without_samples);
         let last = model
             .as_ref()
             .and_then(|m| m.fitted.structure.effects.last());
         let errors = model.as_ref().map(ScoredModel::errors);
-        let refusal = model.as_ref().map(|m| refusal(m, base));
-        Self {
+        let both = model.as_ref().zip(gain.as_ref());
+        let refusal = both.map(|(model, gain)| refusal_for(gain, model, base));
+        let candidate = Self {
             effect,
             form: last.map(|e| e.form.name),
             with: base.effect_names(),
@@ -238,7 +232,8 @@ impl CandidateFit {
             },
             model,
             fewest_parameters: fewest.unwrap_or(usize::MAX),
-        }
+        };
+        (candidate, gain)
     }
 
     /// Names of the effects of its model.
@@ -319,7 +314,7 @@ pub fn fit_all(
             true => to_the_end(fit, records),
             false => fit.clone(),
         };
-        ScoredModel::of(full, records)
+        ScoredModel::of(full, records).map(ScoredModel::without_samples)
     });
     let promising = (fitted.train_sum, least);
     fit_special_cases(forms, &mut fits, promising, records, workers);
@@ -433,60 +428,8 @@ fn from_beginnings(
 /// Significant lines of the training residual.
 fn residual_lines(base: &BaseModel, records: &Records) -> Vec<SpectralLine> {
     let highest_hz = 0.45 * records.rate_hz();
-    let mut found = lines_of(&base.scored.train, highest_hz, 4 * LINES);
+    let mut found = lines_of(&base.scored.train(), highest_hz, 4 * LINES);
     found.retain(|line| line.prominence > PROMINENT);
     found.truncate(LINES);
     found
-}
-
-/// Why an effect is not accepted, considered alone.
-pub fn refusal(model: &ScoredModel, before: &ScoredModel) -> Option<Reason> {
-    if let Some(reason) = no_gain(model, before) {
-        return Some(reason);
-    }
-    if let Some(name) = model.insignificant_parameter() {
-        return Some(Reason::ZeroParameter { name });
-    }
-    (model.criterion() >= before.criterion()).then_some(Reason::CriterionNotLower)
-}
-
-/// Why a model is not better than a simpler one.
-pub fn no_gain(model: &ScoredModel, before: &ScoredModel) -> Option<Reason> {
-    let comparison = model.against(before);
-    let (gain, variance) = (comparison.gain(), model.compared_rms().powi(2));
-    let total = before.compared_rms().powi(2) * before.compared_samples().len() as f64;
-    let change = model.compared_rms() / before.compared_rms() - 1.0;
-    if gain <= 0.0 {
-        return Some(Reason::NoReduction { change });
-    }
-    let count = |m: &ScoredModel| m.effect_names().len();
-    let added = count(model).saturating_sub(count(before)).max(1) as f64;
-    let last = model.fitted.structure.effects.last();
-    let parameters = last.map_or(0, EffectForm::moved) as f64;
-    let least = LEAST_SIGNIFICANCE * added.sqrt() * (parameters / FEW_PARAMETERS).max(1.0);
-    if gain < LEAST_GAIN * variance || comparison.significance() < least {
-        return Some(Reason::NotSignificant { change });
-    }
-    if gain < LEAST_SHARE * total {
-        let share = gain / total;
-        return Some(Reason::SmallShare { share });
-    }
-    None
-}
-
-/// Ratio of a gain, for the number of parameters and samples, to what [`refusal`] requires, whatever the noise, with 95
-/// % confidence.
-pub fn evidence(comparison: &Comparison, samples: usize, parameters: usize) -> f64 {
-    let [gain, std] = comparison.expected_gain();
-    let sure = gain - CERTAIN * std;
-    let [before, after] = comparison.sums();
-    let n = samples as f64;
-    let criterion = n * (1.0 + sure.max(0.0) / after).ln() / (parameters as f64 * n.ln());
-    let least = [
-        sure / (LEAST_GAIN * after / n),
-        sure / (LEAST_SIGNIFICANCE * std),
-        sure / (LEAST_SHARE * before),
-        criterion,
-    ];
-    least.into_iter().fold(f64::INFINITY, f64::min)
 }

@@ -4,15 +4,17 @@
 use std::cell::LazyCell;
 
 use super::SearchState;
+use super::acceptance::{no_gain, refusal};
 use super::applied_noise::NoisierRecords;
 use super::exchange::MANY;
 use super::guard_models::GuardModel;
 use super::noise_floor::NoiseFloorSource;
 use super::pairs::best_pairs;
 use super::reason::{Reason, Status};
+use super::records::Records;
 use super::residual_tests::ResidualTests;
 use super::score::{BaseModel, ScoredModel};
-use super::search::{self, CandidateFit, Round, SAME, Workers, no_gain, refusal, reject_all};
+use super::search::{self, CandidateFit, Round, SAME, Workers, reject_all};
 use super::verdict::{PlainExcess, is_above, noise_rms, remains};
 
 /// Maximum number of added effects.
@@ -40,13 +42,15 @@ struct Way {
 impl SearchState {
     /// Adds effects to the plain stand. `coarse` is the number of integration steps for it.
     pub(super) fn build(&mut self, coarse: usize, workers: Workers) {
-        let base = BaseModel::of(self.before.clone(), &self.records);
+        let (plain, records) = (self.before.clone(), self.records.clone());
+        let base = BaseModel::of(plain.clone(), &records);
         let round = search::try_all(&base, &self.records, workers);
         self.rounds.push(round.tried.clone());
         if let Some(guard) = self.only_law(&base, round.accepted(), workers) {
             return self.withdraw(guard, self.before.clone());
         }
         let starts = self.starts(&base, &round, workers);
+        drop((base, round));
         let mut best: Option<Way> = None;
         for start in starts.iter().take(WAYS) {
             let beats = |best: &Way| {
@@ -79,7 +83,7 @@ impl SearchState {
             }
         }
         self.eliminate(workers.threads);
-        self.ask_guards(&base, workers);
+        self.ask_guards((&plain, &records), workers);
     }
 
     /// A guard model that leaves only noise, or far less than the best effect: several effects in its place would only
@@ -90,7 +94,7 @@ impl SearchState {
         best: Option<&ScoredModel>,
         workers: Workers,
     ) -> Option<GuardModel> {
-        let rival = best.unwrap_or(&self.before).clone();
+        let rival = best.unwrap_or(&self.before).clone().with_samples();
         if !self.is_worthwhile(&rival, &super::tests(&rival)) {
             return None;
         }
@@ -206,9 +210,11 @@ impl SearchState {
     /// Adopts a model as the current one with effects.
     pub(super) fn take(&mut self, next: &ScoredModel, coarse: usize) {
         let next = next.with_modes_fitted(&self.records);
-        (self.after, self.settled) = next.refine_step(&mut self.records, coarse);
+        let after;
+        (after, self.settled) = next.refine_step(&mut self.records, coarse);
+        self.after = after.with_samples();
         self.tests = super::tests(&self.after);
-        self.path.push(self.after.clone());
+        self.path.push(self.after.clone().without_samples());
     }
 
     /// Whether to look for another effect: not with a law for which the integration does not converge.
@@ -255,8 +261,8 @@ impl SearchState {
                     };
                 }
             }
-            self.tests = super::tests(&less);
-            self.after = less;
+            self.after = less.with_samples();
+            self.tests = super::tests(&self.after);
         }
     }
 
@@ -280,7 +286,7 @@ impl SearchState {
     }
 
     /// Tests whether guard models explain more: than all effects, than each of several, and in addition to all.
-    fn ask_guards(&mut self, base: &BaseModel, workers: Workers) {
+    fn ask_guards(&mut self, (plain, of): (&ScoredModel, &Records), workers: Workers) {
         let noise_rms = noise_rms(self.noise_floor);
         let count = self.after.effect_names().len();
         let is_left = remains(&self.after, &self.tests, self.noise_floor);
@@ -288,8 +294,8 @@ impl SearchState {
             return;
         }
         let against = (count > 0).then_some(self.after.clone());
-        let fits = self.rivals(base, workers);
-        if let Some(guard) = GuardModel::best(fits, &base.scored, against.as_ref(), noise_rms) {
+        let fits = self.rivals(&BaseModel::of(plain.clone(), of), workers);
+        if let Some(guard) = GuardModel::best(fits, plain, against.as_ref(), noise_rms) {
             self.withdraw(guard, self.before.clone());
             return;
         }
@@ -320,8 +326,8 @@ impl SearchState {
                 reject_all(std::slice::from_mut(candidate), |c| guard.instead_of(c));
             }
         }
-        self.tests = super::tests(&less);
-        self.after = less;
+        self.after = less.with_samples();
+        self.tests = super::tests(&self.after);
         self.without.clear();
         self.suspected = Some(guard);
     }

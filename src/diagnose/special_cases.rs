@@ -94,7 +94,7 @@ impl ScoredModel {
         let training = self.fitted.with_initial_states(&records.train);
         let values = [others, &own].concat();
         let fitted = fit(structure.with(special), &values, &training, SPECIAL_CASE).ok()?;
-        Self::of(fitted, records)
+        Some(Self::of(fitted, records)?.without_samples())
     }
 }
 

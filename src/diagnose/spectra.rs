@@ -58,15 +58,18 @@ impl SegmentSpectra {
 pub fn energy_spectrum(samples: &[f64], to_each_side: usize) -> Vec<f64> {
     let length = samples.len().next_power_of_two();
     let plan = torqcomp_fourier::forward(length);
-    let mut padded = samples.to_vec();
+    let mut padded = Vec::with_capacity(length);
+    padded.extend_from_slice(samples);
     padded.resize(length, 0.0);
     let mut spectrum = plan.make_output_vec();
     // Cannot fail: the length matches the plan.
     let _ = plan.process(&mut padded, &mut spectrum);
+    drop(padded);
     let last = spectrum.len() - 1;
     let sides = |k: usize| if k == 0 || k == last { 1.0 } else { 2.0 };
     let energy = |(k, s): (usize, &Complex64)| sides(k) * s.norm_sqr() / length as f64;
     let energies: Vec<f64> = spectrum.iter().enumerate().map(energy).collect();
+    drop(spectrum);
     if to_each_side == 0 || samples.is_empty() {
         return energies;
     }

@@ -183,7 +183,8 @@ fn change_of(base: &BaseModel, model: &Chain, record: &StandRecord, k: usize) ->
     };
     let mut moved = raw_residual(model, &record.starting_from(unloaded)).ok()?;
     base.nuisance[k].clear(&mut moved);
-    let pairs = base.scored.train[k].samples.iter().zip(&moved);
+    let before = base.scored.train();
+    let pairs = before[k].samples.iter().zip(&moved);
     let mut change: Vec<f64> = pairs.map(|(b, m)| b - m).collect();
     base.slopes[k].clear(&mut change);
     Some(change)
@@ -197,7 +198,8 @@ fn evaluate(
 ) -> Option<Start> {
     let (model, terms) = structure.model(&values);
     let (mut left, mut along, mut size) = (0.0, 0.0, 0.0);
-    let residuals = training.iter().zip(base.scored.train.iter());
+    let residuals = base.scored.train();
+    let residuals = training.iter().zip(residuals.iter());
     for (k, (record, before)) in residuals.enumerate() {
         if terms.disturb() {
             let mut residual = before.samples.clone();

@@ -95,8 +95,11 @@ impl Unexplained<'_> {
         let mut records: Vec<_> = (0..self.records.len()).map(of_record).collect();
         let each = points.iter().map(|_| {
             let of_records = records.iter_mut().filter_map(Iterator::next);
-            let parts = of_records.collect::<Result<Vec<_>, _>>()?;
-            let mut whole = parts.concat();
+            let mut parts = of_records.collect::<Result<Vec<_>, _>>()?;
+            let mut whole = match parts.len() {
+                1 => parts.pop().unwrap_or_default(),
+                _ => parts.concat(),
+            };
             if let Some(modes) = self.modes.as_ref().filter(|_| clears_modes) {
                 modes.clear(&mut whole);
             }

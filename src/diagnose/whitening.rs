@@ -137,13 +137,13 @@ impl SearchState {
             && context.held.is_none()
             && context.measures == Motion::Displacement;
         let stand = fitted.stand();
-        let floor = NoiseFloor::measured(&self.before.train, &stand.mode());
+        let floor = NoiseFloor::measured(&self.before.train(), &stand.mode());
         let is_small =
             |floor: NoiseFloor| self.after.excess_power(floor.rms) <= LARGE * floor.rms.powi(2);
         if !is_plain || self.records.are_weighted() || !floor.is_some_and(is_small) {
             return;
         }
-        weigh(&mut self.records.train, &stand, &self.before.train);
+        weigh(&mut self.records.train, &stand, &self.before.train());
         if !self.records.are_weighted() {
             return;
         }
@@ -167,8 +167,8 @@ impl SearchState {
             return;
         }
         let stand = self.after.fitted.stand();
-        weigh(&mut self.records.train, &stand, &self.before.train);
-        weigh(&mut self.records.holdout, &stand, &self.before.compared);
+        weigh(&mut self.records.train, &stand, &self.before.train());
+        weigh(&mut self.records.holdout, &stand, &self.before.compared());
         self.score_again(threads);
     }
 
@@ -207,6 +207,9 @@ impl SearchState {
         models.extend(self.without.iter_mut().flatten());
         models.extend(self.suspected.iter_mut().map(|guard| &mut guard.model));
         score(models, &self.records, threads);
+        for model in [&mut self.before, &mut self.after] {
+            *model = model.clone().with_samples();
+        }
         if let Some(guard) = &mut self.suspected {
             guard.errors = guard.model.errors();
         }
@@ -216,7 +219,7 @@ impl SearchState {
     /// Noise and tests with other weights of the records.
     fn compare_anew(&mut self) {
         self.rivals = None;
-        self.noise_floor = NoiseFloor::of(&self.before.compared, &self.before.fitted.passage());
+        self.noise_floor = NoiseFloor::of(&self.before.compared(), &self.before.fitted.passage());
         self.tests_before = super::tests(&self.before);
         self.tests = super::tests(&self.after);
     }
@@ -229,7 +232,7 @@ fn score(models: Vec<&mut ScoredModel>, records: &Records, threads: usize) {
     });
     for (model, scored) in models.into_iter().zip(scored) {
         if let Some(scored) = scored {
-            *model = scored;
+            *model = scored.without_samples();
         }
     }
 }

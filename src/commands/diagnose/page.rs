@@ -1,6 +1,7 @@
 //! HTML report of a diagnosis: records and both models, residuals, candidates, remaining error.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::checks::{load_sentences, running_sentences};
 use super::text::{
@@ -114,8 +115,8 @@ impl Draft<'_> {
             ])
         };
         let before = &self.diagnosis.before;
-        rows.extend(before.train.iter().map(|r| row(r, "training")));
-        rows.extend(before.compared.iter().map(|r| row(r, "hold-out")));
+        rows.extend(before.train().iter().map(|r| row(r, "training")));
+        rows.extend(before.compared().iter().map(|r| row(r, "hold-out")));
         self.page.table(&rows);
     }
 
@@ -125,10 +126,10 @@ impl Draft<'_> {
     }
 
     /// The models drawn, with their residuals on the hold-out records; without an accepted effect, only that before.
-    fn models(&self) -> Vec<(&'static str, &[RecordResidual])> {
-        let mut models = vec![("before", &self.diagnosis.before.compared[..])];
+    fn models(&self) -> Vec<(&'static str, Arc<[RecordResidual]>)> {
+        let mut models = vec![("before", self.diagnosis.before.compared())];
         if !self.diagnosis.effects.is_empty() {
-            models.push(("after", &self.diagnosis.after.compared));
+            models.push(("after", self.diagnosis.after.compared()));
         }
         models
     }
@@ -141,7 +142,7 @@ impl Draft<'_> {
 
     fn models_over_time(&mut self) {
         self.page.heading("Measured and modelled, hold-out records");
-        let before = &self.diagnosis.before.compared;
+        let before = self.diagnosis.before.compared();
         let worst = (0..before.len()).max_by(|a, b| before[*a].rms().total_cmp(&before[*b].rms()));
         let Some((k, worst)) = worst.map(|k| (k, &before[k])) else {
             return;
@@ -169,10 +170,10 @@ impl Draft<'_> {
 
     fn responses(&mut self) {
         let measured = |r: &RecordResidual| r.record.measured_in_range().to_vec();
-        let (x, y) = response(&self.diagnosis.before.compared, measured);
+        let (x, y) = response(&self.diagnosis.before.compared(), measured);
         let mut series = vec![self.line("measured", &x, &y)];
         series.extend(self.models().into_iter().map(|(name, residuals)| {
-            let (x, y) = response(residuals, RecordResidual::prediction);
+            let (x, y) = response(&residuals, RecordResidual::prediction);
             self.line(name, &x, &y)
         }));
         let label = format!("measured per applied, {}/{}", self.unit, self.applied_unit);
@@ -186,7 +187,7 @@ impl Draft<'_> {
 
     fn residuals(&mut self) {
         self.page.heading("Residual, hold-out records");
-        for (k, first) in self.diagnosis.before.compared.iter().enumerate() {
+        for (k, first) in self.diagnosis.before.compared().iter().enumerate() {
             let times_s = first.times_s();
             let chart = self.of_residuals(
                 &file_name(&first.record.source),
@@ -227,7 +228,7 @@ impl Draft<'_> {
         series: impl Fn(&str, &[RecordResidual]) -> Series,
     ) -> Chart {
         let models = self.models().into_iter();
-        let series = models.map(|(name, residuals)| series(name, residuals));
+        let series = models.map(|(name, residuals)| series(name, &residuals));
         Chart {
             first_colour: 1,
             ..Chart::new(title, x_label, y_label, series.collect())
@@ -237,7 +238,7 @@ impl Draft<'_> {
     /// Density of white noise with the power of the noise floor.
     fn noise_floor(&self) -> Option<Series> {
         let rms = self.diagnosis.error.noise_floor_rms?;
-        let holdout = &self.diagnosis.before.compared;
+        let holdout = &self.diagnosis.before.compared();
         let rate_hz = holdout.first()?.record.rate_hz();
         let (x, _) = density(holdout);
         let level = rms * (2.0 / rate_hz).sqrt();
@@ -248,7 +249,7 @@ impl Draft<'_> {
     fn autocorrelation(&self) -> Chart {
         let title = "Autocorrelation (shaded: 99 % limits for white noise)";
         let labels = ["lag, samples", "autocorrelation, no unit"];
-        let (shares, bound) = autocorrelation(&self.diagnosis.before.compared, LAGS);
+        let (shares, bound) = autocorrelation(&self.diagnosis.before.compared(), LAGS);
         let lags: Vec<f64> = (0..shares.len()).map(|lag| lag as f64).collect();
         Chart {
             band: lags.iter().map(|lag| (*lag, -bound, bound)).collect(),
@@ -261,7 +262,7 @@ impl Draft<'_> {
     /// Residuals over the displacement or speed in the model.
     fn over_motion(&self, axis: MotionAxis, name: &str, per: &str) -> Chart {
         let bins = |residuals: &[RecordResidual]| {
-            let mut bins = binned(residuals, &self.diagnosis.after.compared, axis);
+            let mut bins = binned(residuals, &self.diagnosis.after.compared(), axis);
             for bin in &mut bins {
                 for number in [&mut bin.motion, &mut bin.mean, &mut bin.std] {
                     *number /= self.per_printed;
@@ -273,7 +274,7 @@ impl Draft<'_> {
             "Residual over {name}, averaged in bins (shaded: before, ± two standard errors)"
         );
         let x_label = format!("modelled {name}, {}{per}", self.unit);
-        let band = bins(&self.diagnosis.before.compared).into_iter();
+        let band = bins(&self.diagnosis.before.compared()).into_iter();
         let band = band.map(|b| (b.motion, b.mean - 2.0 * b.std, b.mean + 2.0 * b.std));
         Chart {
             band: band.collect(),

@@ -41,7 +41,7 @@ pub fn stand_file(
     let constant = |of: fn(&RecordResidual) -> f64| match held {
         // The initial position of a free body does not apply to other records.
         Some(_) => 0.0,
-        None => mean(&model.train, of),
+        None => mean(&model.train(), of),
     };
     let refined = Refined {
         natural_hz: both(natural_hz),

@@ -34,7 +34,7 @@ impl SearchState {
         if !is_open || !self.can_ask(&model) {
             return;
         }
-        let Some(surface) = Surface::fit(&model, threads).filter(|s| s.improves_on(&model)) else {
+        let Some(surface) = Surface::fit(&model).filter(|s| s.improves_on(&model)) else {
             return;
         };
         let added = model.fitted.structure.added();
@@ -54,7 +54,7 @@ impl SearchState {
 
     /// Reverts to a model without the laws of the motion.
     fn withdraw_laws(&mut self, surface: &Surface) {
-        let ratio = rms(&seen(&self.after.train)) / surface.unseen_rms();
+        let ratio = rms(&seen(&self.after.train())) / surface.unseen_rms();
         let fitted = &self.after.fitted;
         let is_withdrawn = |effect: &EffectForm| is_law(effect.form.stage);
         let added = fitted.structure.added();
@@ -93,7 +93,7 @@ impl SearchState {
     }
 
     /// The surface confirmed by the held-out records; if no effect is named in the end, one in place of all.
-    pub fn force_surface(&self, threads: usize) -> Option<ForceSurface> {
+    pub fn force_surface(&self) -> Option<ForceSurface> {
         if let Some(asked) = &self.surface {
             return asked.report.clone();
         }
@@ -101,7 +101,7 @@ impl SearchState {
         if !self.after.effect_names().is_empty() || !self.can_ask(model) {
             return None;
         }
-        let surface = Surface::fit(model, threads).filter(|s| s.improves_on(model))?;
+        let surface = Surface::fit(model).filter(|s| s.improves_on(model))?;
         surface.report(model, false)
     }
 

@@ -77,38 +77,43 @@ impl Grid {
         parts
     }
 
-    /// Values of all functions along a motion, in units of displacement; `step` is the natural angular frequency over the rate.
-    pub fn functions(&self, motion: &MeasuredMotion, step: f64) -> Vec<Vec<f64>> {
+    /// Values of each function along a motion, in units of displacement; `step` is the natural angular frequency over
+    /// the rate.
+    pub fn functions<'a>(
+        &self,
+        motion: &'a MeasuredMotion,
+        step: f64,
+    ) -> impl Iterator<Item = Vec<f64>> + use<'a> {
         let [largest, fastest] = self.largest;
-        let mut all = hats(&self.x.at, &motion.x, largest);
-        all.extend(hats(&self.speed.at, &motion.speed, largest));
-        all.extend(PRODUCTS.map(|[i, j]| {
+        let of_x = hats(self.x.at.clone(), &motion.x, largest);
+        let of_speed = hats(self.speed.at.clone(), &motion.speed, largest);
+        let products = PRODUCTS.into_iter().map(move |[i, j]| {
             let pairs = motion.x.iter().zip(&motion.speed);
             let part = |value: &f64, largest: f64| (value / largest).clamp(-1.0, 1.0);
             let product = |(x, v): (&f64, &f64)| {
                 largest * part(x, largest).powi(i) * part(v, fastest).powi(j)
             };
             pairs.map(product).collect()
-        }));
-        all.extend(self.turning(motion));
-        all.extend(SLIPS.map(|slip| slipping(&motion.x, slip * largest)));
-        all.push(relaxing(&motion.x, SLOW * step));
-        all
+        });
+        let slips = SLIPS.into_iter();
+        let slips = slips.map(move |slip| slipping(&motion.x, slip * largest));
+        let slow = std::iter::once_with(move || relaxing(&motion.x, SLOW * step));
+        let of_both = products.chain(self.turning(motion));
+        of_x.chain(of_speed).chain(of_both).chain(slips).chain(slow)
     }
 
     /// Functions of displacement that change sign with the direction of motion: position-dependent friction.
-    fn turning(&self, motion: &MeasuredMotion) -> Vec<Vec<f64>> {
+    fn turning<'a>(&self, motion: &'a MeasuredMotion) -> impl Iterator<Item = Vec<f64>> + use<'a> {
         let [largest, fastest] = self.largest;
         let (first, last) = (self.x.at[0], self.x.at[self.x.at.len() - 1]);
         let knot = |k: usize| first + (last - first) * k as f64 / (TURNING - 1) as f64;
-        let knots: Vec<f64> = (0..TURNING).map(knot).collect();
-        let mut all = hats(&knots, &motion.x, largest);
-        for hat in &mut all {
+        let knots = (0..TURNING).map(knot).collect();
+        hats(knots, &motion.x, largest).map(move |mut hat| {
             for (value, speed) in hat.iter_mut().zip(&motion.speed) {
                 *value *= (speed / (TURNED * fastest)).clamp(-1.0, 1.0);
             }
-        }
-        all
+            hat
+        })
     }
 }
 
@@ -129,7 +134,7 @@ impl Knots {
         let mut share = vec![0.0; at.len()];
         let mut whole = 0.0;
         for motion in motions {
-            for (share, hat) in share.iter_mut().zip(hats(&at, motion, 1.0)) {
+            for (share, hat) in share.iter_mut().zip(hats(at.clone(), motion, 1.0)) {
                 *share += hat.iter().sum::<f64>();
             }
             whole += motion.len() as f64;
@@ -141,16 +146,20 @@ impl Knots {
 
 /// Piecewise linear functions that are `size` at one knot and zero at all others; linearly extrapolated beyond the
 /// outer knots.
-fn hats(knots: &[f64], at: &[f64], size: f64) -> Vec<Vec<f64>> {
-    let mut all = vec![vec![0.0; at.len()]; knots.len()];
-    for (i, x) in at.iter().enumerate() {
-        let right = knots.partition_point(|k| k < x).clamp(1, knots.len() - 1);
-        let (low, high) = (knots[right - 1], knots[right]);
-        let part = (x - low) / (high - low);
-        all[right - 1][i] = size * (1.0 - part);
-        all[right][i] = size * part;
-    }
-    all
+fn hats(knots: Vec<f64>, at: &[f64], size: f64) -> impl Iterator<Item = Vec<f64>> {
+    (0..knots.len()).map(move |k| {
+        let value = |x: &f64| {
+            let right = knots.partition_point(|k| k < x).clamp(1, knots.len() - 1);
+            let (low, high) = (knots[right - 1], knots[right]);
+            let part = (x - low) / (high - low);
+            match k {
+                k if k + 1 == right => size * (1.0 - part),
+                k if k == right => size * part,
+                _ => 0.0,
+            }
+        };
+        at.iter().map(value).collect()
+    })
 }
 
 /// A spring that slips where its force would exceed a threshold (Jenkins element).

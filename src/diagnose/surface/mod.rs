@@ -107,8 +107,9 @@ struct Background<'a> {
 impl Surface {
     /// The surface that best explains the training records in place of the laws of a model; `None` if none can be
     /// fitted.
-    pub fn fit(model: &ScoredModel, threads: usize) -> Option<Self> {
-        let fits = parallel(PLACES.len(), threads, |k| Self::at(PLACES[k], model));
+    pub fn fit(model: &ScoredModel) -> Option<Self> {
+        // One after the other: the columns of each are most of the memory of a diagnosis.
+        let fits = PLACES.map(|place| Self::at(place, model));
         let sum = |surface: &Self| dot(&surface.unseen, &surface.unseen);
         let fits = fits.into_iter().flatten();
         fits.min_by(|a, b| sum(a).total_cmp(&sum(b)))
@@ -142,7 +143,7 @@ impl Surface {
 
     /// Whether its cross-validated residual on the training records is significantly smaller than that of a model.
     pub fn improves_on(&self, model: &ScoredModel) -> bool {
-        [&seen(&model.train), &self.unseen_by_plain]
+        [&seen(&model.train()), &self.unseen_by_plain]
             .iter()
             .all(|before| compare(before, &self.unseen).significance() >= LEAST_SIGNIFICANCE)
     }
@@ -162,7 +163,7 @@ impl Surface {
         else {
             return false;
         };
-        let is_shown = [&seen(&model.train), &plain]
+        let is_shown = [&seen(&model.train()), &plain]
             .iter()
             .all(|before| shows(before, &unseen));
         is_shown && {
@@ -181,7 +182,7 @@ impl Surface {
     /// leaves little but noise.
     pub fn outdoes(&self, model: &ScoredModel, noise_rms: f64) -> bool {
         let excess = |rms: f64| rms.powi(2) - noise_rms.powi(2);
-        let left = excess(rms(&seen(&model.train)));
+        let left = excess(rms(&seen(&model.train())));
         let is_much = left >= noise_rms.powi(2);
         let least = left.min(excess(rms(&self.unseen_by_plain)));
         is_much && self.improves_on(model) && excess(self.unseen_rms()) <= LEFT * least
@@ -190,7 +191,8 @@ impl Surface {
     /// Its residual on the records used for comparison, along the motion measured there.
     pub fn left_of_compared(&self, model: &ScoredModel) -> Option<Vec<f64>> {
         let background = Background::of(model, self.place, MotionSource::Record);
-        let left = model.compared.iter().map(|residual| {
+        let compared = model.compared();
+        let left = compared.iter().map(|residual| {
             let record = cut(&residual.record);
             let motion = background.motion(&record)?;
             let (columns, mut left) = background.columns(&record, &motion, &self.grid);
@@ -208,7 +210,8 @@ fn regression(
     model: &ScoredModel,
 ) -> Option<(Grid, Regression)> {
     let background = Background::of(model, place, source);
-    let records = model.train.iter().map(|residual| cut(&residual.record));
+    let train = model.train();
+    let records = train.iter().map(|residual| cut(&residual.record));
     let records: Vec<StandRecord> = records.collect();
     let motions = records.iter().map(|record| background.motion(record));
     let motions: Vec<MeasuredMotion> = motions.collect::<Option<_>>()?;
@@ -221,7 +224,8 @@ fn regression(
 
 /// Training records with the residuals of a model shifted circularly by a fraction of their length.
 fn shifted(regression: &Regression, model: &ScoredModel, part: f64) -> Vec<Vec<f64>> {
-    let both = regression.targets().iter().zip(model.train.iter());
+    let train = model.train();
+    let both = regression.targets().iter().zip(train.iter());
     let with_shifted = |(target, residual): (&Vec<f64>, &RecordResidual)| {
         let left = &residual.samples[..target.len()];
         let others = in_a_circle(left, (part * left.len() as f64) as usize);
@@ -307,7 +311,7 @@ impl<'a> Background<'a> {
             columns.push(cleared(&through(record, linear, |omega| -torque(omega))));
         }
         let step = self.model.fitted.mode().omega_rad_s / record.rate_hz();
-        columns.extend(grid.functions(motion, step).into_iter().map(|mut samples| {
+        columns.extend(grid.functions(motion, step).map(|mut samples| {
             if self.place != SurfacePlace::Stand {
                 // A straight line would be the record itself.
                 clear_line(&mut samples, &motion.x, |_| 1.0);

@@ -75,7 +75,7 @@ impl Surface {
     /// The surface on the records used for comparison; `None` if these do not confirm it.
     pub fn report(&self, model: &ScoredModel, outdoes_laws: bool) -> Option<ForceSurface> {
         let left = rms(&self.left_of_compared(model)?);
-        if left >= rms(&seen(&model.compared)) {
+        if left >= rms(&seen(&model.compared())) {
             return None;
         }
         let unit = model.fitted.structure.context.units.per_printed;
