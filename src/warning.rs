@@ -46,7 +46,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["orders-beyond-band", "orders lie above the band of a compensated record", "compensate with a higher --band, or give the recorded channel and --stand"],
         ["orders-above-nyquist", "orders above half the sampling rate were left out", "record at a higher rate"],
         ["speed-changes", "the speed changes or fluctuates over the record, so the components are averages", "select a part of constant speed with --range"],
-        ["phase-hidden", "the signal at the frequency of a line masks its phase, so part of the line remains", "record without excitation at this frequency"],
+        ["phase-hidden", "the signal at the frequency of a line, or of spikes, masks its phase, so part of it remains", "record without excitation at this frequency"],
         ["resonance-elsewhere", "the record shows no resonance at the declared frequency, but one nearby", "determine the stand's constants with identify decay"],
         ["resonance-above-nyquist", "the resonance is above half the sampling rate, so its ringing aliases into the record", "record at a higher rate, or through a low-pass"],
         ["resampled-gaps", "gaps in the time stamps were filled by linear interpolation", "check these places, or cut the record there"],

@@ -117,7 +117,7 @@ fn round_trip(effect: &Effect, form: &Form) -> (f64, f64, String) {
     (error(COUNT / 10..COUNT - COUNT / 10), ends, ran.stdout)
 }
 
-/// The phases of lines belong to the record, so `simulate` omits them.
+/// The phases of lines and the moments of spikes belong to the record, so `simulate` omits them.
 fn add_lines(folder: &Folder, form: &Form) {
     use torqcomp_model::effects::Action;
     let start = form.starts.first().copied().unwrap_or(&[43.7, 0.1, 0.05]);
@@ -131,6 +131,12 @@ fn add_lines(folder: &Folder, form: &Form) {
                 .enumerate()
                 .map(|(k, l)| l.amplitude * (TAU * l.frequency_hz * time_s + 0.7 * k as f64).sin())
                 .sum(),
+            // In one sample each, from 3 ms on.
+            Action::Spikes(train) => {
+                let turns = train.frequency_hz * (time_s - 3e-3);
+                let is_first = turns.rem_euclid(1.0) < train.frequency_hz / RATE_HZ;
+                if is_first { train.amplitude } else { 0.0 }
+            }
             // Minus its mean over 0.6 s, as a trend has none.
             Action::Course(_) => (2.0 * time_s).sin() - 0.531_4,
             _ => 0.0,

@@ -14,6 +14,7 @@ mod blind_generator;
 mod blind_wide;
 mod changes;
 mod clean;
+mod commutation_spikes;
 mod compensate;
 mod decays;
 mod detection;

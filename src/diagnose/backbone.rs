@@ -83,7 +83,7 @@ impl Backbone {
     pub fn initial(&self) -> InitialState {
         InitialState {
             motion: self.motion,
-            preload: 0.0,
+            ..InitialState::default()
         }
     }
 }

@@ -7,6 +7,7 @@ use std::f64::consts::TAU;
 use super::SearchState;
 use super::acceptance::evidence;
 use super::blocks::compare;
+use super::fit::RecordResidual;
 use super::record::StandRecord;
 use super::score::{BaseModel, EffectParameter, ScoredModel};
 use super::search::listed;
@@ -14,6 +15,7 @@ use super::starts::change;
 use super::structure::EffectForm;
 use crate::parallel::parallel;
 use torqcomp_model::Estimate;
+use torqcomp_model::effects::{SpikeMoments, SpikeShape};
 
 /// The smallest amount of an effect that the training records would have shown with 95 % certainty.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -52,6 +54,8 @@ const MOST: usize = 25;
 const LARGEST_STEP: f64 = 30.0;
 /// Default frequency of a line, in natural frequencies.
 const LINE: f64 = 0.5;
+/// Samples from spike to spike, at least.
+const SPARSE: f64 = 64.0;
 
 /// The limits of all effects that are not part of a model.
 pub fn detection_limits(found: &SearchState, threads: usize) -> Vec<DetectionLimit> {
@@ -82,6 +86,21 @@ struct Amount {
     falls: bool,
 }
 
+/// Moments of spikes of that rate.
+fn moments(record: &StandRecord, frequency_hz: f64) -> SpikeMoments {
+    SpikeMoments {
+        moment: record.range.start as f64,
+        period: record.rate_hz() / frequency_hz,
+    }
+}
+
+/// Spikes of one sample over the range of a record, with its weights.
+fn spikes(record: &StandRecord, frequency_hz: f64, amplitude: f64) -> Vec<f64> {
+    let moments = moments(record, frequency_hz);
+    let one = SpikeShape::of(&[amplitude]);
+    record.weighted(one.train(moments, record.range.clone()).collect())
+}
+
 impl Amount {
     fn of(base: &BaseModel, effect: EffectForm) -> Option<Self> {
         let scales = &base.scored.fitted.structure.context.scales;
@@ -96,6 +115,10 @@ impl Amount {
             true => Some(1),
             false => effect.size(),
         };
+        if effect.is_train() {
+            let rate_hz = base.scored.train.first()?.record.rate_hz();
+            values[0] = values[0].min(parameters[0].moved(rate_hz / SPARSE, scales));
+        }
         values.resize(parameters.len(), 1.0);
         Some(Self {
             effect,
@@ -176,6 +199,11 @@ impl Amount {
         let amplitude = size.value(amount, &context.scales);
         Some(base.cleared(|k| {
             let record = &training[k];
+            if self.effect.is_train() {
+                let mut spikes = spikes(record, frequency_hz, amplitude);
+                base.nuisance[k].clear(&mut spikes);
+                return spikes;
+            }
             let turn = TAU * frequency_hz / record.rate_hz();
             let line = record.range.clone().map(|i| turn * i as f64);
             let mut line: Vec<f64> = line.map(|phase| amplitude * phase.cos()).collect();
@@ -191,7 +219,17 @@ impl Amount {
         let left = train.iter().map(|r| r.samples.as_slice());
         let left = left.collect::<Vec<_>>().concat();
         let with: Vec<f64> = left.iter().zip(change).map(|(r, c)| r + c).collect();
-        let parameters = self.effect.form.parameters.len();
+        let mut parameters = self.effect.form.parameters.len();
+        if self.effect.is_train() {
+            // The shape of the spikes of each record.
+            let records = base.scored.train.iter();
+            let of_record = |r: &RecordResidual| {
+                let frequency = &self.effect.form.parameters[0];
+                let scales = &base.scored.fitted.structure.context.scales;
+                moments(&r.record, frequency.value(self.values[0], scales)).column_count()
+            };
+            parameters += records.map(of_record).sum::<usize>();
+        }
         evidence(&compare(&with, &left), left.len(), parameters)
     }
 

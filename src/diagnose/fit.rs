@@ -9,7 +9,7 @@ use torqcomp_model::{Chain, Mode};
 use super::own_of_records::{OwnOfRecords, within};
 use super::record::{InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord, StateSlopes};
 use super::record_model::RecordModel;
-use super::structure::{PlainStand, Structure};
+use super::structure::{EffectForm, PlainStand, Structure};
 use super::unexplained::{Unexplained, raw_residual};
 use torqcomp_dsp::dot;
 
@@ -138,9 +138,9 @@ pub fn fit(
     let mut values = found.values;
     values.truncate(count);
     Ok(FittedModel {
-        amplitudes: line_amplitudes(&structure, &values, &records, &free),
+        amplitudes: amplitudes(&structure, &values, &records, &free),
+        std: with_std_of_rate(&structure, &found.std[..count], &values, &records),
         structure,
-        std: found.std[..count].to_vec(),
         train_sum: found.sum_of_squares,
         converged: found.stop.converged(),
         initial: records.iter().map(|r| r.initial).collect(),
@@ -160,7 +160,8 @@ fn minimize(
     effort: FitEffort,
 ) -> Result<(Fit, bool), FitError> {
     let own = structure.bounds().len();
-    let start_model = structure.model(start).0;
+    let (start_model, terms) = structure.model(start);
+    find_spikes(&start_model, &terms, records);
     let of_records = OwnOfRecords::of(&start_model, structure.context.scales.rms, records);
     let mut parameters = parameters(structure, start);
     parameters.extend(of_records.parameters(records));
@@ -194,8 +195,46 @@ fn inside(structure: &Structure, values: &[f64]) -> Vec<f64> {
 /// The structure's parameters.
 fn parameters(structure: &Structure, start: &[f64]) -> Vec<Parameter> {
     let own = start.iter().zip(structure.bounds());
-    own.map(|(s, bounds)| within(*s, bounds, s.abs().max(1e-4)))
-        .collect()
+    let own = own.map(|(s, bounds)| within(*s, bounds, s.abs().max(1e-4)));
+    let mut own: Vec<Parameter> = own.collect();
+    // The error has many minima over the rate of spikes, which is found in the residual instead.
+    if let Some(rate) = rate_of_spikes(structure) {
+        own[rate].fixed = true;
+    }
+    own
+}
+
+/// Index of the rate of a train of spikes.
+fn rate_of_spikes(structure: &Structure) -> Option<usize> {
+    let effects = structure.effects.iter();
+    let train = effects.clone().position(EffectForm::is_train)?;
+    let before: usize = effects.take(train).map(EffectForm::moved).sum();
+    Some(structure.context.plain_count() + before)
+}
+
+/// Standard uncertainties with that of the rate of spikes: over the longest record, the sum of their intervals is known
+/// to a sample on either side.
+fn with_std_of_rate(
+    structure: &Structure,
+    std: &[Option<f64>],
+    values: &[f64],
+    records: &[StandRecord],
+) -> Vec<Option<f64>> {
+    let mut std = std.to_vec();
+    if let Some(rate) = rate_of_spikes(structure) {
+        let longest = records.iter().map(StandRecord::count).max().unwrap_or(1);
+        std[rate] = Some(values[rate] / (longest as f64 * 3.0_f64.sqrt()));
+    }
+    std
+}
+
+/// Finds the moments of spikes in the residual of each record.
+fn find_spikes(model: &Chain, terms: &NuisanceTerms, records: &mut [StandRecord]) {
+    for record in records.iter_mut().filter(|_| terms.spikes_hz.is_some()) {
+        if let Ok(residual) = raw_residual(model, record) {
+            *record = record.clone().with_spikes(terms, &residual);
+        }
+    }
 }
 
 impl RecordResidual {
@@ -267,27 +306,44 @@ fn lasts(records: &[StandRecord], free: &Mode) -> bool {
     records.iter().any(|record| fades(record) < 1000.0_f64.ln())
 }
 
-/// Mean amplitude of each line over the records.
-fn line_amplitudes(
+/// Mean amplitude of each line and of the spikes over the records, in the order of the effects.
+fn amplitudes(
     structure: &Structure,
     values: &[f64],
     records: &[StandRecord],
     free: &Mode,
 ) -> Vec<f64> {
     let model = structure.model(values);
-    let mut sums = vec![0.0; model.1.lines_hz.len()];
-    if sums.is_empty() {
-        return sums;
+    let terms = &model.1;
+    let (mut lines, mut spikes) = (vec![0.0; terms.lines_hz.len()], 0.0);
+    if lines.is_empty() && terms.spikes_hz.is_none() {
+        return lines;
     }
     for record in records {
         let Some((_, found)) = nuisance_of(&model, record, free) else {
             continue;
         };
-        for (sum, [c, s]) in sums.iter_mut().zip(&found.lines) {
+        for (sum, [c, s]) in lines.iter_mut().zip(&found.lines) {
             *sum += c.hypot(*s) / records.len() as f64;
         }
+        spikes += found.peak_of_spikes(record, terms) / records.len() as f64;
     }
-    sums
+    let mut lines = lines.into_iter();
+    let of_effect = |effect: &EffectForm| -> Vec<f64> {
+        match effect.is_train() {
+            true => vec![spikes],
+            false => lines.by_ref().take(effect.amplitudes()).collect(),
+        }
+    };
+    structure.effects.iter().flat_map(of_effect).collect()
+}
+
+impl NuisanceFit {
+    /// Largest magnitude of the spikes in a record.
+    fn peak_of_spikes(&self, record: &StandRecord, terms: &NuisanceTerms) -> f64 {
+        let moments = terms.spikes_hz.and_then(|hz| record.spike_moments(hz));
+        moments.map_or(0.0, |m| self.spikes.peak(m, record.range.clone()))
+    }
 }
 
 impl InitialState {
@@ -380,7 +436,7 @@ impl FittedModel {
     fn restore_amplitudes(&self, terms: &NuisanceTerms, found: &mut RecordResidual) {
         let rate_hz = found.record.rate_hz();
         let lines = terms.lines_hz.iter().zip(&found.nuisance.lines);
-        for ((frequency_hz, [c, s]), amplitude) in lines.zip(&self.amplitudes) {
+        for ((frequency_hz, [c, s]), amplitude) in lines.zip(self.amplitudes_of(false)) {
             let own = c.hypot(*s);
             if own == 0.0 {
                 continue;
@@ -396,6 +452,33 @@ impl FittedModel {
                 .zip(line)
                 .for_each(|(r, l)| *r += l);
         }
+        self.restore_spikes(terms, found);
+    }
+
+    /// The same for spikes, whose moments and shape belong to the record.
+    fn restore_spikes(&self, terms: &NuisanceTerms, found: &mut RecordResidual) {
+        let record = &found.record;
+        let own = found.nuisance.peak_of_spikes(record, terms);
+        let moments = terms.spikes_hz.and_then(|hz| record.spike_moments(hz));
+        let amplitude = self.amplitudes_of(true).next();
+        let (Some(moments), Some(amplitude), true) = (moments, amplitude, own > 0.0) else {
+            return;
+        };
+        let excess = 1.0 - amplitude / own;
+        let shape = &found.nuisance.spikes;
+        let train = shape.train(moments, record.range.clone());
+        let train = record.weighted(train.map(|s| excess * s).collect());
+        let both = found.samples.iter_mut().zip(train);
+        both.for_each(|(r, s)| *r += s);
+    }
+
+    /// Amplitudes of the spikes, or of the lines.
+    fn amplitudes_of(&self, trains: bool) -> impl Iterator<Item = f64> {
+        let effects = self.structure.effects.iter();
+        let each = effects.flat_map(|e| std::iter::repeat_n(e.is_train(), e.amplitudes()));
+        let each = each.zip(&self.amplitudes);
+        each.filter(move |(is_train, _)| *is_train == trains)
+            .map(|(_, amplitude)| *amplitude)
     }
 }
 

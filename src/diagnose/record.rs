@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use torqcomp_fourier::phasors;
+use torqcomp_model::effects::{SpikeMoments, SpikeSearch, SpikeShape};
 use torqcomp_model::simulate::{Excitation, MotionState};
 use torqcomp_model::{Chain, Mode, StandRun};
 
@@ -12,12 +13,14 @@ use super::columns::Columns;
 use super::records::EXCLUDED;
 use super::whitening::Whitening;
 
-/// State of the stand at the first sample of a record.
+/// State of the stand at the first sample of a record, and of its drive.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct InitialState {
     pub motion: MotionState,
     /// Displacement under a constant load that is not in the input.
     pub preload: f64,
+    /// Moment of a spike of the model's train, in samples from the first; `None` if the record shows no train.
+    pub spike: Option<f64>,
 }
 
 impl InitialState {
@@ -55,6 +58,8 @@ pub struct StandRecord {
 pub struct NuisanceTerms {
     /// Frequencies of lines, such as mains pickup.
     pub lines_hz: Vec<f64>,
+    /// Rate of a train of spikes.
+    pub spikes_hz: Option<f64>,
     /// Half waves of a slow drift.
     pub drift_half_waves: usize,
     /// Rates at which a state from before the record decays, per s.
@@ -66,6 +71,7 @@ pub struct NuisanceTerms {
 impl NuisanceTerms {
     pub const NONE: Self = Self {
         lines_hz: Vec::new(),
+        spikes_hz: None,
         drift_half_waves: 0,
         decays_per_s: Vec::new(),
         modes: Vec::new(),
@@ -74,6 +80,7 @@ impl NuisanceTerms {
     /// The terms that do not depend on the fit parameters.
     pub fn lasting(self) -> Self {
         Self {
+            spikes_hz: self.spikes_hz,
             drift_half_waves: self.drift_half_waves,
             modes: self.modes,
             ..Self::NONE
@@ -82,7 +89,7 @@ impl NuisanceTerms {
 
     /// Whether it includes disturbances not caused by the applied quantity.
     pub fn disturb(&self) -> bool {
-        !self.lines_hz.is_empty() || self.drift_half_waves > 0
+        !self.lines_hz.is_empty() || self.spikes_hz.is_some() || self.drift_half_waves > 0
     }
 }
 
@@ -107,6 +114,8 @@ pub struct Nuisance {
     preload: Option<usize>,
     /// Index of the first of the two columns of each further free mode, with its `ω₀`.
     modes: Vec<(usize, f64)>,
+    /// Indices of the columns of a train of spikes.
+    spikes: Range<usize>,
     /// Index of the first column of the lines.
     lines: usize,
 }
@@ -220,6 +229,25 @@ impl StandRecord {
         samples
     }
 
+    /// The record with the moments of the spikes that its weighted residual shows.
+    pub fn with_spikes(mut self, terms: &NuisanceTerms, residual: &[f64]) -> Self {
+        self.initial.spike = terms.spikes_hz.and_then(|spikes_hz| {
+            let period = self.rate_hz() / spikes_hz;
+            let residual = self.without_weights(residual.to_vec());
+            let found = SpikeSearch::of(&residual, period).found(period)?;
+            let first = self.range.start as f64;
+            (found.share() > 0.0).then_some(first + found.moments.moment)
+        });
+        self
+    }
+
+    /// The moments of the spikes of a train at that rate, in samples from the first.
+    pub fn spike_moments(&self, spikes_hz: f64) -> Option<SpikeMoments> {
+        let period = self.rate_hz() / spikes_hz;
+        let of = |moment| SpikeMoments { moment, period };
+        self.initial.spike.map(of)
+    }
+
     /// A weighted residual without its weights.
     pub fn without_weights(&self, mut samples: Vec<f64>) -> Vec<f64> {
         if let Some(whitening) = &self.whitening {
@@ -286,6 +314,12 @@ impl StandRecord {
                 columns.push(column);
             }
         }
+        let first = columns.count();
+        let moments = terms.spikes_hz.and_then(|hz| self.spike_moments(hz));
+        for column in moments.iter().flat_map(|m| m.columns(self.range.clone())) {
+            columns.push(self.weighted(column));
+        }
+        nuisance.spikes = first..columns.count();
         nuisance.lines = columns.count();
     }
 
@@ -321,6 +355,7 @@ pub struct NuisanceFit {
     pub preload: Option<f64>,
     /// Cosine and sine part of each line.
     pub lines: Vec<[f64; 2]>,
+    pub spikes: SpikeShape,
 }
 
 impl Nuisance {
@@ -348,6 +383,7 @@ impl Nuisance {
                 .chunks_exact(2)
                 .map(|c| [c[0], c[1]])
                 .collect(),
+            spikes: SpikeShape::of(&raw[self.spikes.clone()]),
         }
     }
 }

@@ -89,6 +89,7 @@ impl RecordModel {
             false => (raw_residual(&self.chain, &record).ok()?, None),
         };
         let raw = record.without_weights(samples.clone());
+        let record = record.with_spikes(&self.terms, &samples);
         let nuisance = record.nuisance(&self.free, &self.terms, slopes);
         let nuisance = nuisance.fit(&mut samples);
         // For a free decay, all motion follows from the initial state.

@@ -201,8 +201,19 @@ impl ScoredModel {
         self.fitted.values.len()
             + self.fitted.amplitudes.len()
             + terms.lines_hz.len() * self.train.records()
+            + self.parameters_of_spikes()
             + terms.drift_half_waves
             + terms.decays_per_s.len()
+    }
+
+    /// Number of parameters of the moments and shapes of spikes in the training records.
+    fn parameters_of_spikes(&self) -> usize {
+        let (_, terms) = self.fitted.structure.model(&self.fitted.values);
+        let of_record = |r: &RecordResidual| {
+            let moments = r.record.spike_moments(terms.spikes_hz?);
+            moments.map(|moments| moments.column_count())
+        };
+        self.train.iter().filter_map(of_record).sum()
     }
 
     /// An essential parameter of the last effect that does not differ significantly from zero.

@@ -10,6 +10,7 @@ use super::backbone::Backbone;
 use super::record::{InitialState, StandRecord};
 use super::score::BaseModel;
 use super::spectra::SpectralLine;
+use super::spike_train::train_rate_hz;
 use super::structure::{EffectForm, Structure};
 use super::unexplained::raw_residual;
 use torqcomp_dsp::{dot, sort_by_number};
@@ -68,7 +69,7 @@ pub fn best_starts(
         evaluate(base, structure, values, training)
     };
     let scales = &structure.context.scales;
-    let mut starts: Vec<(Vec<f64>, Start)> = own_values(effect, lines, scales)
+    let mut starts: Vec<(Vec<f64>, Start)> = own_values(effect, base, lines, scales)
         .into_iter()
         .filter_map(|own| evaluated(&own).map(|start| (own, start)))
         .collect();
@@ -122,14 +123,24 @@ fn from_backbone(structure: &Structure, plain: &[f64], training: &[StandRecord])
     })
 }
 
-/// Start values of an effect's own parameters; for a line also the significant frequencies of the residual.
-fn own_values(effect: &EffectForm, lines: &[SpectralLine], scales: &RecordScales) -> Vec<Vec<f64>> {
+/// Start values of an effect's own parameters; for a line also the significant frequencies of the residual, for a train
+/// of spikes its rate.
+fn own_values(
+    effect: &EffectForm,
+    base: &BaseModel,
+    lines: &[SpectralLine],
+    scales: &RecordScales,
+) -> Vec<Vec<f64>> {
     let mut all: Vec<Vec<f64>> = effect.form.starts.iter().map(|s| s.to_vec()).collect();
     if effect.is_line() {
         let frequency = &effect.form.parameters[0];
         let bounds = frequency.lower..=frequency.upper;
         let size = frequency.size(scales);
-        let near = lines.iter().map(|line| line.frequency_hz / size);
+        let found_hz: Vec<f64> = match effect.is_train() {
+            true => train_rate_hz(&base.scored.train).into_iter().collect(),
+            false => lines.iter().map(|line| line.frequency_hz).collect(),
+        };
+        let near = found_hz.iter().map(|hz| hz / size);
         all.extend(near.filter(|f| bounds.contains(f)).map(|f| vec![f]));
     }
     all
@@ -203,6 +214,7 @@ fn evaluate(
     for (k, (record, before)) in residuals.enumerate() {
         if terms.disturb() {
             let mut residual = before.samples.clone();
+            let record = record.clone().with_spikes(&terms, &residual);
             let nuisance = record.nuisance(&base.scored.fitted.free, &terms, None);
             nuisance.clear(&mut residual);
             left += dot(&residual, &residual);

@@ -172,6 +172,11 @@ impl EffectForm {
         }
     }
 
+    /// Number of its amplitudes of lines or spikes.
+    pub fn amplitudes(&self) -> usize {
+        self.form.parameters.len() - self.moved()
+    }
+
     /// Index of the parameter that measures its magnitude: the first that may be zero.
     pub fn size(&self) -> Option<usize> {
         let parameters = self.form.parameters.iter().take(self.moved());
@@ -190,6 +195,12 @@ impl EffectForm {
     /// Whether it adds a signal independent of the input, which may differ between records.
     pub fn is_disturbance(&self) -> bool {
         self.form.stage == Stage::Disturbance
+    }
+
+    /// Whether it adds a train of spikes, the lines of which have one amplitude.
+    pub fn is_train(&self) -> bool {
+        let any = vec![1.0; self.form.parameters.len()];
+        self.is_line() && matches!((self.form.build)(&any), Action::Spikes(_))
     }
 
     /// Whether it adds lines: its parameters are a frequency, followed by amplitudes.
@@ -345,6 +356,7 @@ impl Structure {
             let link = Link::of(effect.effect, effect.form, &own);
             match &link.action {
                 Action::Lines(lines) => terms.lines_hz.extend(lines.iter().map(|l| l.frequency_hz)),
+                Action::Spikes(train) => terms.spikes_hz = Some(train.frequency_hz),
                 Action::Course(count) => {
                     terms.drift_half_waves = terms.drift_half_waves.max(*count);
                 }

@@ -17,7 +17,7 @@ use torqcomp_dsp::band::Band;
 use torqcomp_dsp::compensate::{Extension, Inverse, InverseFilter};
 use torqcomp_model::chain::{Chain, GagePath, Group, Link};
 use torqcomp_model::effects::{
-    self, Action, FoundLine, SampleClock, SpectralLine, Stage, Torque, Unrecovered,
+    self, Action, FoundLine, SampleClock, SpectralLine, SpikeTrain, Stage, Torque, Unrecovered,
 };
 
 use crate::failure::{ErrorCode, Failure};
@@ -56,7 +56,7 @@ pub(crate) struct InverseResult {
     pub applied: Vec<f64>,
     /// Effects with the samples that cannot be recovered.
     pub lost: Vec<(&'static str, Unrecovered)>,
-    /// Lines that were subtracted.
+    /// Lines and trains of spikes that were subtracted.
     pub lines: Vec<FoundLine>,
     /// Where the speed is not significantly different from zero, if a torque depends on its sign.
     pub at_rest: Option<AtRest>,
@@ -271,19 +271,23 @@ impl Pass<'_> {
 
     fn disturbances(&mut self) {
         let mut lines: Vec<SpectralLine> = Vec::new();
+        let mut spikes: Vec<SpikeTrain> = Vec::new();
         let mut waves = 0;
         for link in self.inverse.links() {
             match &link.action {
                 Action::Lines(more) => lines.extend(more),
+                Action::Spikes(train) => spikes.push(*train),
                 Action::Course(more) => waves = waves.max(*more),
                 _ => {}
             }
         }
+        let rate_hz = self.rate_hz();
         if !lines.is_empty() {
-            let rate_hz = self.rate_hz();
             self.result.lines =
                 effects::subtract_lines(&mut self.samples, rate_hz, &lines, self.noise_std);
         }
+        let trains = effects::subtract_spikes(&mut self.samples, rate_hz, &spikes);
+        self.result.lines.extend(trains);
         if waves > 0 {
             effects::subtract_course(&mut self.samples, waves);
         }

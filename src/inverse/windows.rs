@@ -54,12 +54,14 @@ impl RecordWindow {
 
 impl ChainInverse {
     /// Number of samples on both sides of a window beyond which nothing affects it; `None` if the record has to be
-    /// inverted as a whole: for lines and trends that are fitted to all of it, for effects that depend on time or have
-    /// their own memory, for a coupling past the stand, and for links whose inverse does not decay.
+    /// inverted as a whole: for lines, spikes and trends that are fitted to all of it, for effects that depend on time
+    /// or have their own memory, for a coupling past the stand, and for links whose inverse does not decay.
     pub(crate) fn margin(&self) -> Option<usize> {
         let stand = &self.chain.stand;
         let is_local = self.links().iter().all(|link| match &link.action {
-            Action::Lines(_) | Action::Course(_) | Action::Feedthrough(_) => false,
+            Action::Lines(_) | Action::Spikes(_) | Action::Course(_) | Action::Feedthrough(_) => {
+                false
+            }
             Action::Distortion(distortion) => distortion.is_pointwise(),
             _ => link.dies_out(stand) && !link.blocks_constants(stand),
         });

@@ -170,6 +170,20 @@ pub const CATALOGUE: &[Variant] = &[
         (0.0, 0.01, 0.5),
     ),
     variant(
+        "commutation-spikes",
+        "decaying",
+        2,
+        disturbance::decaying_spikes,
+        (0.0, 0.01, 3.0),
+    ),
+    variant(
+        "commutation-spikes",
+        "one sample",
+        1,
+        disturbance::short_spikes,
+        (0.0, 0.01, 3.0),
+    ),
+    variant(
         "cubic-stiffness",
         "hardening",
         3,

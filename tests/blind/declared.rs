@@ -119,6 +119,13 @@ fn effect(truth: &Value, stiffness: f64) -> Option<Effect> {
             ],
         ),
         ("thermal-drift", _) => made("course", &[]),
+        ("commutation-spikes", _) => made(
+            "train",
+            &[
+                ("frequency", p("frequency_hz")?, "Hz"),
+                ("amplitude", p("amplitude_n_m")?, "N m"),
+            ],
+        ),
         ("rotor-imbalance", _) => rotor(truth).and_then(|lines| made("twice", &lines)),
         ("cubic-stiffness", variant) => {
             let coefficient = p("n_m_per_rad_to_the_power")? / stiffness.powi(3);

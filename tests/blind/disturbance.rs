@@ -1,4 +1,4 @@
-//! Disturbances added to the signal: mains, drift, the rotor.
+//! Disturbances added to the signal: mains, drift, the rotor, the drive.
 
 use std::f64::consts::TAU;
 
@@ -177,4 +177,43 @@ pub fn drift_random(scene: &Scene, size: f64, _: &mut Draw) -> Built {
         }
     };
     Built::samples(scene, change, &[("range_n_m", range)])
+}
+
+/// Spikes of a drive that decay within some samples.
+pub fn decaying_spikes(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
+    let decay = draw.between(1.0, 5.0);
+    spikes(scene, size, draw, move |after: f64| (-after / decay).exp())
+}
+
+/// Spikes of a drive in one sample each.
+pub fn short_spikes(scene: &Scene, size: f64, draw: &mut Draw) -> Built {
+    spikes(scene, size, draw, |after: f64| f64::from(after < 1.0))
+}
+
+/// Spikes at equal intervals of 40 samples to a thirtieth of the record, from a random moment on.
+fn spikes(
+    scene: &Scene,
+    size: f64,
+    draw: &mut Draw,
+    shape: impl Fn(f64) -> f64 + 'static,
+) -> Built {
+    let longest = (scene.span.samples as f64 / 30.0).clamp(45.0, 1000.0);
+    let period = draw.log_between(40.0, longest);
+    let height = size * scene.shown_rms * draw.sign();
+    let change = move |place: &mut Place, samples: &mut [f64]| {
+        let mut at = period * place.draw.unit();
+        while at < samples.len() as f64 {
+            let from = at.ceil() as usize;
+            for (i, sample) in samples.iter_mut().enumerate().skip(from).take(60) {
+                *sample += height * shape(i as f64 - at);
+            }
+            at += period;
+        }
+    };
+    let rate_hz = RATE_HZ / period;
+    Built::samples(
+        scene,
+        change,
+        &[("frequency_hz", rate_hz), ("amplitude_n_m", height.abs())],
+    )
 }

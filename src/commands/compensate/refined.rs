@@ -213,8 +213,8 @@ fn describe(report: &mut CompensateReport, undone: &InverseResult, scales: &Scal
         report.warnings.push(Warning::new(
             "phase-hidden",
             format!(
-                "the signal at {} Hz masks the phase of the line there: only {} % of its amplitude was removed; record \
-                 without excitation at this frequency",
+                "the signal masks the phase of the line or of the spikes at {} Hz: only {} % of the amplitude was \
+                 removed; record without excitation at this frequency",
                 rounded(line.frequency_hz, 5),
                 rounded(100.0 * line.share, 2)
             ),

@@ -81,7 +81,7 @@ pub(in crate::commands) struct CompensateReport {
     pub(super) seen_to_hz: Option<f64>,
     /// Times at which the torque cannot be recovered from the record.
     pub(super) lost: Vec<LostSpan>,
-    /// Lines removed, in `unit` after static conversion.
+    /// Lines and trains of spikes removed, in `unit` after static conversion.
     pub(super) lines: Vec<RemovedLine>,
     /// The band, and where it comes from.
     pub(super) band: BandReport,
@@ -130,15 +130,15 @@ pub(super) struct UndoneEffect {
 /// A line that was taken off, in the unit of the result as a record at rest has it.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub(super) struct RemovedLine {
-    /// Frequency of the line, in Hz.
+    /// Frequency of the line, or rate of the spikes, in Hz.
     pub(super) frequency_hz: f64,
-    /// Amplitude of the line in the stand file.
+    /// Amplitude of the line, or peak of the spikes, in the stand file.
     pub(super) amplitude: f64,
-    /// Amplitude of the record at this frequency, signal included.
+    /// Amplitude of the record at this frequency, signal included; peak of the spikes in the record.
     pub(super) recorded: f64,
-    /// Phase of the line's sine at the first sample, in rad.
+    /// Phase of the line's sine at the first sample, in rad; that of spikes is 0 at each of them.
     pub(super) phase_rad: f64,
-    /// Fraction of the amplitude removed: less than 1 where the signal masks the phase.
+    /// Fraction of the amplitude removed: less than 1 where the signal masks the phase, or the spikes.
     pub(super) share: f64,
 }
 

@@ -91,7 +91,7 @@ fn integrate_all<'a>(
 }
 
 impl Chain {
-    /// The record for an input, without lines: their phase differs from record to record.
+    /// The record for an input, without lines and spikes: their phase differs from record to record.
     ///
     /// A motion that [is integrated](Self::is_integrated) starts from `start`, any other in the steady state of the
     /// backward extension of the record. Samples are NaN once the motion has diverged.
@@ -316,10 +316,11 @@ impl Chain {
                 distortion.forward(clock, &mut samples);
                 Signal::Samples(samples)
             }
-            // The phase of a line and a slow trend differ from record to record.
+            // The phase of a line, the moments of spikes and a slow trend differ from record to record.
             Action::Recorder { .. }
             | Action::Torque { .. }
             | Action::Lines(_)
+            | Action::Spikes(_)
             | Action::Course(_) => signal,
         }
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 
 use super::lines::SpectralLine;
+use super::spikes::SpikeTrain;
 use crate::modal::ModalResponse;
 use crate::mode::Mode;
 
@@ -61,6 +62,8 @@ pub enum Action {
     Distortion(Box<dyn Distortion>),
     /// Added spectral lines.
     Lines(Vec<SpectralLine>),
+    /// Added spikes at equal intervals.
+    Spikes(SpikeTrain),
     /// An added slow trend that belongs to the record, with at most this many half waves over its length.
     Course(usize),
 }
@@ -222,7 +225,7 @@ impl Action {
             Self::Factor(_) | Self::Stiffness(_) | Self::Feedthrough(_) | Self::Recorder { .. } => {
                 Treatment::DividedOut
             }
-            Self::Lines(_) | Self::Course(_) => Treatment::Subtracted,
+            Self::Lines(_) | Self::Spikes(_) | Self::Course(_) => Treatment::Subtracted,
             Self::Distortion(distortion) => distortion.treatment(),
             Self::Torque { torque, .. } if torque.begin(1.0) == [0.0; 2] => Treatment::Inverted,
             Self::Torque { .. } => Treatment::Integrated,
@@ -240,6 +243,7 @@ impl std::fmt::Debug for Action {
             Self::Recorder { .. } => "Recorder",
             Self::Distortion(_) => "Distortion",
             Self::Lines(_) => "Lines",
+            Self::Spikes(_) => "Spikes",
             Self::Course(_) => "Course",
         })
     }

@@ -19,10 +19,13 @@ mod curve;
 mod lines;
 mod parameter;
 mod rivals;
+mod spike_search;
+mod spikes;
 
 mod backlash;
 mod bouc_wen_hysteresis;
 mod capacitive_coupling;
+mod commutation_spikes;
 mod coulomb_friction;
 mod cubic_stiffness;
 mod end_stop;
@@ -52,6 +55,8 @@ pub use capacitive_coupling::level;
 pub use lines::{FoundLine, SpectralLine, subtract_lines};
 pub use parameter::{EffectParameter, ParameterScale, RecordScales, Unit};
 pub use rivals::RIVALS;
+pub use spike_search::{FoundTrain, SpikeSearch, find_trains, subtract_spikes};
+pub use spikes::{SpikeMoments, SpikeShape, SpikeTrain};
 pub use thermal_drift::subtract_course;
 
 /// All effects.
@@ -66,6 +71,7 @@ pub const EFFECTS: &[&Effect] = &[
     &mains_pickup::EFFECT,
     &thermal_drift::EFFECT,
     &rotor_imbalance::EFFECT,
+    &commutation_spikes::EFFECT,
     &cubic_stiffness::EFFECT,
     &quadratic_stiffness::EFFECT,
     &coulomb_friction::EFFECT,
