@@ -7,7 +7,6 @@ use std::f64::consts::TAU;
 use super::SearchState;
 use super::acceptance::evidence;
 use super::blocks::compare;
-use super::fit::RecordResidual;
 use super::record::StandRecord;
 use super::score::{BaseModel, EffectParameter, ScoredModel};
 use super::search::listed;
@@ -116,7 +115,7 @@ impl Amount {
             false => effect.size(),
         };
         if effect.is_train() {
-            let rate_hz = base.scored.train.first()?.record.rate_hz();
+            let rate_hz = base.scored.records().first()?.rate_hz();
             values[0] = values[0].min(parameters[0].moved(rate_hz / SPARSE, scales));
         }
         values.resize(parameters.len(), 1.0);
@@ -222,11 +221,11 @@ impl Amount {
         let mut parameters = self.effect.form.parameters.len();
         if self.effect.is_train() {
             // The shape of the spikes of each record.
-            let records = base.scored.train.iter();
-            let of_record = |r: &RecordResidual| {
+            let records = base.scored.records().iter();
+            let of_record = |record: &StandRecord| {
                 let frequency = &self.effect.form.parameters[0];
                 let scales = &base.scored.fitted.structure.context.scales;
-                moments(&r.record, frequency.value(self.values[0], scales)).column_count()
+                moments(record, frequency.value(self.values[0], scales)).column_count()
             };
             parameters += records.map(of_record).sum::<usize>();
         }

@@ -28,9 +28,9 @@ impl ModelResiduals {
         }
     }
 
-    /// Number of records.
-    pub fn records(&self) -> usize {
-        self.records.len()
+    /// The records, with the initial states found for the model.
+    pub fn records(&self) -> &[StandRecord] {
+        &self.records
     }
 
     /// Number of samples.

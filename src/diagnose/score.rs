@@ -95,6 +95,11 @@ impl ScoredModel {
         Some(self)
     }
 
+    /// The training records, with the initial states found for the model.
+    pub fn records(&self) -> &[StandRecord] {
+        self.train.records()
+    }
+
     /// Residuals on the training records.
     pub fn train(&self) -> Arc<[RecordResidual]> {
         self.train.with_samples(&self.fitted)
@@ -200,7 +205,7 @@ impl ScoredModel {
         let (_, terms) = self.fitted.structure.model(&self.fitted.values);
         self.fitted.values.len()
             + self.fitted.amplitudes.len()
-            + terms.lines_hz.len() * self.train.records()
+            + terms.lines_hz.len() * self.train.records().len()
             + self.parameters_of_spikes()
             + terms.drift_half_waves
             + terms.decays_per_s.len()
@@ -209,11 +214,11 @@ impl ScoredModel {
     /// Number of parameters of the moments and shapes of spikes in the training records.
     fn parameters_of_spikes(&self) -> usize {
         let (_, terms) = self.fitted.structure.model(&self.fitted.values);
-        let of_record = |r: &RecordResidual| {
-            let moments = r.record.spike_moments(terms.spikes_hz?);
+        let of_record = |record: &StandRecord| {
+            let moments = record.spike_moments(terms.spikes_hz?);
             moments.map(|moments| moments.column_count())
         };
-        self.train.iter().filter_map(of_record).sum()
+        self.train.records().iter().filter_map(of_record).sum()
     }
 
     /// An essential parameter of the last effect that does not differ significantly from zero.

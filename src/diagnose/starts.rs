@@ -137,7 +137,7 @@ fn own_values(
         let bounds = frequency.lower..=frequency.upper;
         let size = frequency.size(scales);
         let found_hz: Vec<f64> = match effect.is_train() {
-            true => train_rate_hz(&base.scored.train).into_iter().collect(),
+            true => train_rate_hz(&base.scored.train()).into_iter().collect(),
             false => lines.iter().map(|line| line.frequency_hz).collect(),
         };
         let near = found_hz.iter().map(|hz| hz / size);
