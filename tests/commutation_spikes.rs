@@ -114,7 +114,7 @@ fn compensated(folder: &Folder, record: &str, stand: &str) -> Vec<f64> {
 fn a_train_is_named_and_removed() {
     let trains = [
         (20.0, Some(3.0), 205.55),
-        (10.0, Some(1.0), 133.217),
+        (20.0, Some(1.0), 133.217),
         (20.0, None, 77.31),
         (20.0, Some(5.0), 707.37),
     ];

@@ -37,7 +37,7 @@ impl SpikeMoments {
         let after = (sample as f64 - self.moment) / self.period;
         let after = self.period * (after - after.floor());
         let index = after as usize;
-        (index < self.length()).then(|| (index, after - index as f64))
+        (index < self.length()).then_some((index, after - index as f64))
     }
 
     /// Columns whose sum with the coefficients of a [`SpikeShape`] is the train.
