@@ -12,7 +12,7 @@ const ROWS: [usize; 2] = [400_000, 1_200_000];
 const NONE: f64 = 12.0;
 
 /// A record at 20 kHz with some of its channels: torque, bridge voltage, a decay that restarts every 2 s, and noise
-/// with the response of a resonance to it.
+/// with the response of a resonance to it; and lines with the response of a stand to them.
 fn record(rows: usize, channels: &[&str]) -> String {
     let names: Vec<String> = channels.iter().map(|name| format!(",{name}")).collect();
     let mut text = format!("time_s{}\n", names.concat());
@@ -32,6 +32,7 @@ fn record(rows: usize, channels: &[&str]) -> String {
         let turning = 9.0 * slow.cos() - 3.24 * slow.sin() + 4.7 * fast.cos() - 4.418 * fast.sin();
         let answer = applied + 2.0 * 0.98 * 0.3_f64.cos() * ringing[0] - 0.98 * 0.98 * ringing[1];
         ringing = [answer, ringing[0]];
+        let [driving, driven] = driven(t);
         let _ = write!(text, "{t:.5}");
         for channel in channels {
             let _ = match *channel {
@@ -48,12 +49,29 @@ fn record(rows: usize, channels: &[&str]) -> String {
                 "turning_Nm" => write!(text, ",{:.5}", turning + 0.1 * applied),
                 "noise_Nm" => write!(text, ",{applied:.5}"),
                 "answer_V" => write!(text, ",{answer:.5}"),
+                "driving_Nm" => write!(text, ",{driving:.5}"),
+                "driven_Nm" => write!(text, ",{:.5}", driven + 0.01 * applied),
                 other => panic!("no channel {other}"),
             };
         }
         text.push('\n');
     }
     text
+}
+
+/// A torque of 12 lines from 50 to 1260 Hz, and the response of a stand with 600 Hz and a damping ratio of 0.02.
+fn driven(t: f64) -> [f64; 2] {
+    let line = |k: i32| {
+        let hz = 50.0 + 110.3 * f64::from(k);
+        let ratio = hz / 600.0;
+        let (real, imaginary) = (1.0 - ratio * ratio, 0.04 * ratio);
+        let phase = std::f64::consts::TAU * hz * t + f64::from(k * k);
+        let lag = imaginary.atan2(real);
+        [phase.cos(), (phase - lag).cos() / real.hypot(imaginary)]
+    };
+    (0..12)
+        .map(line)
+        .fold([0.0; 2], |sum, [u, y]| [sum[0] + u, sum[1] + y])
 }
 
 /// Peak resident memory of a run so far, in bytes.
@@ -88,7 +106,7 @@ fn peak_of(folder: &Folder, args: &[&str]) -> f64 {
 /// docs/reliability.md.
 type Measured = (&'static str, &'static [&'static str], [usize; 2], f64);
 
-const VERBS: [Measured; 9] = [
+const VERBS: [Measured; 10] = [
     (
         "compensate LONG --stand stand.toml -o out.csv --force",
         &["bridge_V"],
@@ -132,13 +150,19 @@ const VERBS: [Measured; 9] = [
         "identify response LONG --applied noise --measured answer --excitation random --modes 1 --band 300..3000",
         &["noise_Nm", "answer_V"],
         ROWS,
-        100.0,
+        95.0,
     ),
     (
         "identify runup LONG --motion angle --torque turning",
         &["angle_rad", "turning_Nm"],
         ROWS,
-        170.0,
+        110.0,
+    ),
+    (
+        "diagnose --train LONG --applied driving --measured driven",
+        &["driving_Nm", "driven_Nm"],
+        [20_000, 60_000],
+        700.0,
     ),
 ];
 
@@ -217,4 +241,29 @@ fn a_text_without_room_is_refused() {
         "{said}"
     );
     assert_eq!(folder.names(), ["long.csv", "stand.toml"]);
+}
+
+/// So is a diagnosis whose records fit, but not the fits to them.
+#[test]
+fn a_diagnosis_without_room_is_refused() {
+    let folder = Folder::new();
+    let rows = "0.5,1.25\n-0.5,0.25\n".repeat(3_000_000);
+    folder.write("long.csv", format!("driving_Nm,driven_Nm\n{rows}"));
+    let script = "ulimit -v 580000; exec \"$0\" diagnose --train long.csv --rate 1000 --applied driving \
+                  --measured driven";
+    let ran = std::process::Command::new("sh")
+        .args(["-c", script, env!("CARGO_BIN_EXE_torqcomp")])
+        .current_dir(folder.path(""))
+        .output()
+        .expect("the shell starts");
+    let said = String::from_utf8_lossy(&ran.stderr);
+    assert_eq!(ran.status.code(), Some(1), "{said}");
+    assert!(
+        said.contains("the fits take at least 0.6 GB of memory, and this process may have 0.59 GB"),
+        "{said}"
+    );
+    assert!(
+        said.contains("choose a shorter part with --range"),
+        "{said}"
+    );
 }
