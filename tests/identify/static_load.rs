@@ -475,3 +475,102 @@ fn blank_lines_between_series_are_no_rows() {
     );
     of("ol.csv").says(1, &["line 7", "correct or delete the row"]);
 }
+
+/// Readings at 10 Hz behind a first-order lag of a time constant in s, as loads are put on one after the other for 8 s, with
+/// noise of 1e-3 V.
+fn lagging(loads: &[f64], time_constant_s: f64, noise: &mut Noise) -> Vec<Point> {
+    let mut shown = 0.3;
+    let mut points = Vec::new();
+    for load in loads {
+        for _ in 0..80 {
+            let settled = 0.3 + 0.1 * load;
+            shown = settled + (shown - settled) * (-0.1 / time_constant_s).exp();
+            points.push(point(*load, shown + 1e-3 * noise.normal(), 0));
+        }
+    }
+    points
+}
+
+/// The lag is neither in the sensitivity nor a curve, and the uncertainty allows for the extrapolation: after 8 s, 7 % of a
+/// change are missing with 3 s.
+#[test]
+fn readings_that_never_settle_give_the_settled_sensitivity() {
+    let units = units();
+    let mut noise = Noise(51);
+    let loads = [
+        0.0, 20.0, 40.0, 60.0, 80.0, 100.0, 80.0, 60.0, 40.0, 20.0, 0.0,
+    ];
+    for (time_constant_s, is_short) in [(1.0, false), (3.0, true)] {
+        let mut coverage = Coverage::default();
+        for _ in 0..100 {
+            let points = lagging(&loads, time_constant_s, &mut noise);
+            let found = identify(&points, 1, &units).unwrap();
+            let slope = of(&found, "sensitivity");
+            coverage.count(slope, 0.1);
+            assert!((slope.value() / 0.1 - 1.0).abs() < 2e-4, "{slope:?}");
+            let codes: Vec<&str> = found.warnings.iter().map(|w| w.code).collect();
+            assert!(codes.contains(&"unsettled-left-out"), "{codes:?}");
+            assert_eq!(codes.contains(&"still-settling"), is_short, "{codes:?}");
+            assert!(!codes.contains(&"not-linear"), "{codes:?}");
+        }
+        // More than 95 %, as the rows of eleven loads determine one time constant.
+        assert!(coverage.inside >= 92, "{} of 100", coverage.inside);
+    }
+}
+
+/// With two time constants, 1 and 4 s, one exponential fits the late rows only: the uncertainty includes the rest.
+#[test]
+fn readings_that_settle_twice_are_uncertain() {
+    let units = units();
+    let mut noise = Noise(52);
+    let loads = [
+        0.0, 20.0, 40.0, 60.0, 80.0, 100.0, 80.0, 60.0, 40.0, 20.0, 0.0,
+    ];
+    let [fast, slow] = [1.0, 4.0].map(|time_s| lagging(&loads, time_s, &mut noise));
+    let both = fast.iter().zip(&slow).map(|(fast, slow)| {
+        let reading = 0.6 * fast.reading + 0.4 * slow.reading;
+        point(fast.load, reading, 0)
+    });
+    let found = identify(&both.collect::<Vec<_>>(), 1, &units).unwrap();
+    let slope = of(&found, "sensitivity");
+    let (value, std) = (slope.value(), slope.std().unwrap());
+    assert!(
+        (value - 0.1).abs() < 3.0 * std && std < 1e-3,
+        "{value} ± {std}"
+    );
+    assert!(found.warnings.iter().any(|w| w.code == "still-settling"));
+}
+
+/// A slow ramp up and down: the stand's friction of 0.2 % of the range, built up over 4 % of it after each reversal (a
+/// spring in series with a slider), or a lens of 1 % that closes at both ends.
+#[test]
+fn hysteresis_of_a_ramp_does_not_bias_the_sensitivity() {
+    let units = units();
+    let mut noise = Noise(53);
+    for is_lens in [false, true] {
+        for (rows, cycles) in [(200, 1), (2000, 1), (2000, 3)] {
+            let (mut points, mut slider, mut before) = (Vec::new(), 0.0_f64, 0.0);
+            for i in 0..=rows * cycles {
+                let phase = (i % rows) as f64 / rows as f64;
+                let part = 1.0 - (2.0 * phase - 1.0).abs();
+                slider = (slider + 0.05 * (part - before)).clamp(-0.002, 0.002);
+                before = part;
+                let lens = 0.04 * part * (1.0 - part) * (0.5 - phase).signum();
+                let lag = if is_lens { lens } else { slider };
+                let reading = 0.3 + 10.0 * (part - lag) + 1e-3 * noise.normal();
+                points.push(point(100.0 * part, reading, 0));
+            }
+            let loads: Vec<f64> = points.iter().map(|p| p.load).collect();
+            for (point, series) in points.iter_mut().zip(series_of(&loads)) {
+                point.series = series;
+            }
+            let found = identify(&points, 1, &units).unwrap();
+            let slope = of(&found, "sensitivity");
+            let (value, std) = (slope.value(), slope.std().unwrap());
+            let what = format!("{is_lens}, {rows} rows, {cycles} cycles: {value} ± {std}");
+            // The slider takes up 0.4 % of the reading at its ends, which a straight line through all rows shares out.
+            assert!((value / 0.1 - 1.0).abs() < 1.5e-3, "{what}");
+            assert!((value - 0.1).abs() < 2.5 * std, "{what}");
+        }
+    }
+}

@@ -28,7 +28,7 @@ use super::solve::{Mixed, VarianceRatios};
 use super::steps::LoadSteps;
 use crate::student::student;
 
-/// Significance level of the hysteresis.
+/// Significance level of additional coefficients.
 const CHANCE: f64 = 0.01;
 /// Upper limit of variance ratios, to avoid overflow of their products.
 const LARGEST_RATIO: f64 = 1e100;
@@ -118,6 +118,9 @@ pub(super) fn fit(
         }
     }
     let mut found = model.fit(degree, ratios)?;
+    if steps.is_ramp {
+        model.average(&mut found, ratios);
+    }
     if let Some(std) = over_mountings(points, degree, largest, ratios) {
         found.std[1] = Some(std);
     }
@@ -213,6 +216,14 @@ fn ranges_of_load(steps: &LoadSteps) -> Vec<Vec<usize>> {
     ranges
 }
 
+/// Whether a sum of squares is significantly smaller than another with fewer coefficients, by F-test; `more` is the
+/// number of additional coefficients, `freedom` that of degrees of freedom that remain.
+pub(super) fn is_significant((others, own): (f64, f64), more: f64, freedom: f64) -> bool {
+    let ratio = (others - own) / more / (own / freedom);
+    let law = FisherSnedecor::new(more, freedom);
+    ratio > 0.0 && law.is_ok_and(|law| law.sf(ratio.min(LARGEST_RATIO)) < CHANCE)
+}
+
 impl Mixed {
     /// Whether a column is sufficiently independent of those of the model for its coefficient to be
     /// identifiable.
@@ -242,11 +253,8 @@ impl Mixed {
         let (Some(own), Some(others)) = (self.weighted(ratios), other.weighted(ratios)) else {
             return false;
         };
-        let more = (self.fixed.len() - other.fixed.len()) as f64;
-        let freedom = self.freedom() as f64;
-        let ratio = (others - own) / more / (own / freedom);
-        let law = FisherSnedecor::new(more, freedom);
-        ratio > 0.0 && law.is_ok_and(|law| law.sf(ratio.min(LARGEST_RATIO)) < CHANCE)
+        let more = self.fixed.len() - other.fixed.len();
+        is_significant((others, own), more as f64, self.freedom() as f64)
     }
 
     /// Weighted sum of squares for given variances.
@@ -292,6 +300,25 @@ impl Mixed {
             has_even_drift: false,
             has_hysteresis: false,
         })
+    }
+
+    /// Replaces the curve by that of ordinary least squares, with uncertainties that allow for these variances.
+    fn average(&self, found: &mut LoadCurve, ratios: VarianceRatios) {
+        let solved = self.solve(ratios).zip(self.ordinary(ratios));
+        let Some((weighted, (values, variances))) = solved else {
+            return;
+        };
+        let scale = if self.is_known {
+            1.0
+        } else {
+            weighted.variance
+        };
+        let factor = student(self.freedom() as f64);
+        let curve = found.values.iter_mut().zip(&mut found.std);
+        for ((value, std), (ordinary, variance)) in curve.zip(values.iter().zip(variances)) {
+            *value = *ordinary;
+            *std = std.map(|_| (scale * variance).sqrt() * factor);
+        }
     }
 
     /// Degrees of freedom of a coefficient's variance (Welch and Satterthwaite).

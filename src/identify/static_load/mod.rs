@@ -4,7 +4,9 @@ mod filter;
 mod groups;
 mod linear;
 mod mixed;
+mod ramp;
 mod rows;
+mod settling;
 mod solve;
 mod steps;
 mod terms;
@@ -19,6 +21,7 @@ use crate::chart::{Chart, Series};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::{self, plural, rounded};
 use mixed::LoadCurve;
+use ramp::RampReadings;
 use steps::LoadSteps;
 
 /// One reading under a known load.
@@ -137,20 +140,32 @@ pub fn identify(
     degree: usize,
     units: &LoadUnits,
 ) -> Result<Identification, Failure> {
-    let (points, unsettled) = rows::settled(points);
-    let points = &points[..];
     let steps = LoadSteps::of(points);
-    let largest = steps.largest;
     let is_one_weight = one_weight(points, degree, &steps)?;
+    let settled = settling::settled(points);
+    let points = settled.as_ref().map_or(points, |s| &s.points);
+    let ramp = ramp::ranges(points);
+    let points = ramp.as_ref().map_or(points, |r| &r.points);
+    let steps = LoadSteps {
+        is_ramp: ramp.is_some(),
+        ..LoadSteps::of(points)
+    };
+    let largest = steps.largest;
     groups::refuse_mixed(points)?;
     linear::refuse_two_ranges(points, &steps)?;
     let mut fit = mixed::fit(points, degree, &steps)?;
+    let shared = settled.as_ref().map(|s| s.widen(&mut fit.std, largest));
+    if let Some(ramp) = &ramp {
+        ramp.widen(&mut fit.std, largest);
+    }
     zero::limit_std(&mut fit, points, largest);
     follows(points, &fit, largest)?;
     let unscale = |(k, v): (usize, &f64)| v / largest.powi(k as i32);
     let curve: Vec<f64> = fit.values.iter().enumerate().map(unscale).collect();
     let mut result = Identification::new("static");
-    rows::warn_unsettled(&mut result, unsettled);
+    if let Some((settled, shared)) = settled.as_ref().zip(shared) {
+        settled.warn(&mut result, (shared / fit.values[1]).abs());
+    }
     if steps.is_sorted {
         rows::warn_sorted(&mut result);
     }
@@ -161,6 +176,9 @@ pub fn identify(
     contradicted(&mut result, &fit);
     zero::drifting(&mut result, &fit, points, (largest, &units.reading));
     result.fit = Some(quality);
+    result
+        .method
+        .extend(ramp.as_ref().map(RampReadings::method));
     method(&mut result, &fit, points, &units.reading);
     result.terms = terms::terms(points, &steps, &curve);
     result.steps = calibration_points(points, &steps, &fit);

@@ -113,6 +113,48 @@ impl Mixed {
         })
     }
 
+    /// Coefficients by ordinary least squares, and their variances with errors of these variances, relative to that of
+    /// a reading; `None` if the columns do not determine them. With A = (XᵀX)⁻¹Xᵀ, that of a coefficient is
+    /// `Σ_i A_i² + v_w Σ_i (Σ_{k≥i} A_k)² + v_a Σ_s (Σ_{k∈s} A_k)² + v_b Σ_p (Σ_{k∈p} A_k x_k)²`.
+    pub fn ordinary(
+        &self,
+        [drift, zeros, sensitivities]: VarianceRatios,
+    ) -> Option<(DVector<f64>, Vec<f64>)> {
+        let design = DMatrix::from_fn(self.readings.len(), self.fixed.len(), |i, k| {
+            self.fixed[k][i]
+        });
+        let inverse = design.tr_mul(&design).cholesky()?.inverse();
+        let weights = inverse * design.transpose();
+        let values = &weights * DVector::from_column_slice(&self.readings);
+        let variance = |k: usize| {
+            let row: Vec<f64> = weights.row(k).iter().copied().collect();
+            let own: f64 = row
+                .iter()
+                .zip(&self.variances)
+                .map(|(a, v)| a * a * v)
+                .sum();
+            let mut tail = 0.0;
+            let tails = row.iter().skip(1).rev().map(|a| {
+                tail += a;
+                tail * tail
+            });
+            let walk: f64 = tails.sum();
+            let by_group = |groups: &Groups, factor: &dyn Fn(usize) -> f64| {
+                let mut sums = vec![0.0; groups.count()];
+                for (i, group) in groups.of_row.iter().enumerate() {
+                    if let Some(sum) = sums.get_mut(*group) {
+                        *sum += row[i] * factor(i);
+                    }
+                }
+                sums.iter().map(|sum| sum * sum).sum::<f64>()
+            };
+            let of_series = by_group(&self.series, &|_| 1.0);
+            let of_mountings = by_group(&self.mountings, &|i| self.loads[i]);
+            own + drift * walk + zeros * of_series + sensitivities * of_mountings
+        };
+        Some((values, (0..self.fixed.len()).map(variance).collect()))
+    }
+
     /// Rows of the columns and the reading, whitened one after the other; also ln of the determinant of their
     /// covariance.
     fn whitened(&self, ratios: VarianceRatios) -> (Vec<f64>, f64) {

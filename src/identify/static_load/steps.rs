@@ -15,6 +15,8 @@ pub(super) struct LoadSteps {
     pub largest: f64,
     /// Whether the rows are sorted, so that their order in time is lost.
     pub is_sorted: bool,
+    /// Whether they are ranges of a steadily changing load.
+    pub is_ramp: bool,
 }
 
 impl LoadSteps {
@@ -30,6 +32,7 @@ impl LoadSteps {
             loads,
             largest,
             is_sorted: rows::is_sorted(points),
+            is_ramp: false,
         }
     }
 
