@@ -68,6 +68,14 @@ pub(super) fn damping_law(
     Ok(())
 }
 
+/// Whether a law with dry friction describes a decay clearly better than a sine with viscous damping, and than all others.
+pub(super) fn is_dry(fit: &ModesFit, stretches: &[Stretch]) -> Result<bool, Failure> {
+    let mut found = Identification::new("decay");
+    damping_law(&mut found, fit, stretches)?;
+    let best = found.laws.first();
+    Ok(!found.warnings.is_empty() && best.is_some_and(|law| law.dry_friction.is_some()))
+}
+
 /// Smallest reported relative change of decay rate and of frequency between the halves of a decay.
 const NOTABLE: [f64; 2] = [0.02, 1e-4];
 

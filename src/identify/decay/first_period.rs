@@ -35,7 +35,8 @@ pub(super) fn cut_off(stretches: &mut [Stretch], found: &ModesFit, too_large: f6
     for (stretch, residuals) in stretches.iter_mut().zip(&found.residuals) {
         let period = (stretch.rate_hz() / main.frequency_hz()).ceil() as usize;
         let (least, periods) = FEWEST;
-        let is_long = period >= least && residuals.len() >= periods * period;
+        // A line of almost no frequency has a period beyond any number of samples.
+        let is_long = period >= least && residuals.len() / periods >= period;
         let fails = || {
             let next = rms(&residuals[period..(1 + NEXT) * period]);
             rms(&residuals[..period]) > too_large * next

@@ -245,8 +245,15 @@ pub(super) fn continued(stretches: &[Stretch], start: &[f64]) -> Result<ModesFit
     let fit = refit(stretches, start, (true, true))?;
     let parameters = parameters(stretches, &fit.values, (true, true));
     let jacobian = fit::derivatives(&residuals(stretches), &parameters, &fit.values)?;
+    let white = fit.clone();
+    let mut found = modes::with_colour(fit, (stretches, 1), (&jacobian, 2));
+    // The colour of few samples is uncertain: noise does not determine the constants better than white noise would.
+    let is_too_small = |i: usize| found.fit.std[i] < white.std[i];
+    if (0..2).any(is_too_small) {
+        found.fit = white;
+    }
     Ok(ModesFit {
         has_friction: true,
-        ..modes::with_colour(fit, (stretches, 1), (&jacobian, 2))
+        ..found
     })
 }

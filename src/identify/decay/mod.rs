@@ -21,7 +21,6 @@ use super::hum::SteadyLine;
 use super::{FitQuality, Identification, ModalPole, hum, rms};
 use crate::failure::Failure;
 use crate::warning::Warning;
-use torqcomp_model::fit::FitError;
 
 use anew::Beginning;
 use attempt::Attempt;
@@ -107,6 +106,7 @@ fn evaluated(
     dependence::damping_law(&mut result, &fit, &stretches)?;
     dependence::amplitude_dependence(&mut result, &fit, &stretches, order[0]);
     present::apart(&mut result, &fit, stretches.len());
+    present::crowded(&mut result, &fit, order[0]);
     present::poor(&mut result, &fit, &stretches, (order[0], has_baseline));
     by_hand::compare(&mut result, &fit, &stretches, order[0]);
     present::draw(&mut result, &fit, &stretches);
@@ -117,11 +117,11 @@ fn evaluated(
 /// as they were fitted.
 ///
 /// # Errors
-/// [`FitError`] if there are too few samples.
+/// If there are too few samples.
 fn found<'a>(
     stretches: &mut Vec<Stretch>,
     (wanted, lines): (&'a ModeSearch, &'a [SteadyLine]),
-) -> Result<(Attempt<'a>, Vec<Beginning>), FitError> {
+) -> Result<(Attempt<'a>, Vec<Beginning>), Failure> {
     let recorded = stretches.clone();
     // A fit of many modes takes long, and dry friction looks like many.
     let few = ModeSearch {
@@ -142,7 +142,7 @@ fn found<'a>(
     }
     let (found, beginnings) = anew::cut(found, stretches, (wanted, lines))?;
     let is_split = found.fit.poles.len() > 1 || !beginnings.is_empty();
-    if is_split
+    if (is_split || dependence::is_dry(&found.fit, stretches)?)
         && wanted.count.is_none_or(|modes| modes == 1)
         && let Some(moving) = one_mode::instead((&found.fit, stretches), &recorded, wanted)?
     {

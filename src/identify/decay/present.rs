@@ -5,7 +5,7 @@ use super::modes::{ModesFit, Stretch};
 use crate::chart::{Chart, Series};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::hum::{SteadyLine, listed};
-use crate::identify::{self, Identification};
+use crate::identify::{self, Identification, Pole};
 use crate::print::{plural, rounded};
 use crate::warning::Warning;
 
@@ -133,6 +133,28 @@ pub(super) fn apart(result: &mut Identification, fit: &ModesFit, stretches: usiz
                  they are of different stands; identify them one by one",
                 rounded(hz(k), 5),
                 rounded(hz(l), 5)
+            ),
+        );
+    }
+}
+
+/// Relative distance from the strongest mode within which a stand has few others, and their minimum number.
+const CROWD: (f64, usize) = (0.3, 4);
+
+/// Warns about more modes about the strongest one than a stand has.
+pub(super) fn crowded(result: &mut Identification, fit: &ModesFit, main: usize) {
+    let hz = fit.poles[main].frequency_hz();
+    let (distance, least) = CROWD;
+    let is_near = |pole: &&Pole| (pole.frequency_hz() / hz - 1.0).abs() < distance;
+    let others = fit.poles.iter().filter(is_near).count() - 1;
+    if others >= least {
+        result.warn(
+            "crowded-modes",
+            format!(
+                "{others} modes lie within {} % of the strongest one at {} Hz: a single mode that is stopped by dry friction \
+                 looks like this where another mode rings beside it; filter that out with the upper end of --band",
+                rounded(100.0 * distance, 2),
+                rounded(hz, 5)
             ),
         );
     }
