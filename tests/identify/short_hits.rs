@@ -1,6 +1,7 @@
 //! Uncertainties from one short hit of a few samples, against an independent fine-step simulation.
 
 use std::f64::consts::{PI, TAU};
+use std::fmt::Write;
 
 use crate::noise::Noise;
 use crate::util::Folder;
@@ -75,4 +76,42 @@ fn the_uncertainty_of_one_short_hit_covers_its_error() {
     );
     assert!(10 * held >= 9 * stated, "{held} of {stated}");
     assert!(10 * wide <= stated, "{wide} of {stated} are of no use");
+}
+
+/// Noise of the force changes each hit as a whole, and with it the gain, but hardly the resonance: the uncertainties of
+/// frequency and damping are neither smaller than their errors nor several times as large.
+#[test]
+fn the_noise_of_the_force_of_several_hits_counts_once() {
+    let folder = Folder::new();
+    let mut noise = Noise(12);
+    let (hz, ratio, trials) = (120.0, 0.02, 20);
+    let mut squares = [0.0; 2];
+    for trial in 0..trials {
+        let mut text = String::from("time_s,force [N m],T [N m]\n");
+        for place in 0..5 {
+            let at_s = 0.05 + (0.618 * f64::from(5 * trial + place)).fract() / RATE_HZ;
+            for (row, (force, x)) in hit(hz, ratio, 12.0 / RATE_HZ, at_s).iter().enumerate() {
+                let time_s = (3000 * place as usize + row) as f64 / RATE_HZ;
+                let (force, x) = (force + 4e-3 * noise.normal(), x + 1e-4 * noise.normal());
+                let _ = writeln!(text, "{time_s:.4},{force:.9e},{x:.9e}");
+            }
+        }
+        folder.write("hits.csv", text);
+        let verb = ["identify", "response", "hits.csv", "--modes", "1", "--json"];
+        let report = folder.json(&[&verb[..], &["--applied", "force", "--measured", "T"]].concat());
+        let all = report["parameters"].as_array().expect("parameters");
+        let truths = [("natural_frequency", hz), ("damping_ratio", ratio)];
+        for ((name, truth), sum) in truths.iter().zip(&mut squares) {
+            let found = all.iter().find(|p| p["name"] == *name).expect(name);
+            let number = |key: &str| found[key].as_f64().expect("a number");
+            *sum += ((number("value") - truth) / number("std")).powi(2);
+        }
+    }
+    for sum in squares {
+        let error = (sum / f64::from(trials)).sqrt();
+        assert!(
+            (0.55..1.5).contains(&error),
+            "{error} standard uncertainties rms"
+        );
+    }
 }

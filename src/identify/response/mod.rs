@@ -6,6 +6,7 @@ mod force;
 mod foreign;
 mod inverse;
 mod kind;
+mod line_noise;
 mod lines;
 mod modal;
 mod next;

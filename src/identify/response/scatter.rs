@@ -35,6 +35,7 @@ use torqcomp_model::Covariance;
 
 use super::blocks::Set;
 use super::inverse::invert;
+use super::line_noise;
 use super::lines::Lines;
 use super::{Data, Modal};
 use crate::failure::Failure;
@@ -49,13 +50,9 @@ const CHANCE: f64 = 0.05;
 const REACH: usize = 40;
 /// Weight, relative to the largest, below which a line is ignored.
 const SILENT: f64 = 1e-3;
-/// Number of lines on each side over which the power of the errors is averaged.
-const NEIGHBOURS: usize = 5;
 /// Divisor of the number of lines that gives those, just below the Nyquist frequency, used for noise and aliasing
 /// of the applied signal.
 const TOP: usize = 10;
-/// Correlation of the noise amplitude of half-overlapping Hann-weighted segments.
-const SHARED: f64 = 1.0 / 6.0;
 
 /// Covariance of poles and delay and, for a single mode, of the real and imaginary part of its residue.
 ///
@@ -178,7 +175,7 @@ impl Linearised {
 }
 
 /// Power of the applied signal at each line, summed over blocks.
-fn applied_power(set: &Set, lines: &Lines) -> Vec<f64> {
+pub(super) fn applied_power(set: &Set, lines: &Lines) -> Vec<f64> {
     let power = |k: usize| set.blocks.iter().map(|b| b.applied[k].norm_sqr()).sum();
     lines.clone().map(power).collect()
 }
@@ -271,7 +268,12 @@ fn from_noise(
     let power = 2.0 * squares / freedom as f64;
     let sizes = match set.blocks.len() {
         0 | 1 => sizes_of_one(set, lines, data, &fitted.response, power),
-        _ => error_sizes(set, lines, &data.weight, power, counted),
+        _ => line_noise::sizes(
+            (set, lines),
+            &data.weight,
+            &fitted.response,
+            (power, counted),
+        ),
     };
     let middle = gathered(set, lines, solved, &sizes) * 0.5;
     &solved.inverse * middle * &solved.inverse
@@ -309,54 +311,6 @@ pub(super) fn is_of_force(set: &Set, lines: &Lines, data: &Data, fitted: &Modal)
     let squares = fitted.fit.as_ref().map_or(0.0, |f| f.sum_of_squares);
     let of_force = power_of_force_error(set, lines, data, &fitted.response);
     set.blocks.len() == 1 && of_force.iter().sum::<f64>() > squares
-}
-
-/// s_k of each line; `power` is the mean power of the residuals over the lines that count.
-fn error_sizes(set: &Set, lines: &Lines, weight: &[f64], power: f64, counted: usize) -> Vec<f64> {
-    let scattered: Vec<f64> = lines
-        .clone()
-        .zip(weight)
-        .map(|(k, w)| w * w * variance(set, k))
-        .collect();
-    let smooth: Vec<f64> = (0..scattered.len())
-        .map(|k| {
-            let from = k.saturating_sub(NEIGHBOURS);
-            let part = &scattered[from..(k + NEIGHBOURS + 1).min(scattered.len())];
-            part.iter().sum::<f64>() / part.len() as f64
-        })
-        .collect();
-    let mean = smooth.iter().sum::<f64>() / counted.max(1) as f64;
-    let overlap = match set.window {
-        Window::Hann => 1.0 + 2.0 * SHARED * SHARED,
-        _ => 1.0,
-    };
-    // The residual may be larger than the scatter between blocks.
-    let more = if mean > 0.0 {
-        (power / mean).max(overlap)
-    } else {
-        0.0
-    };
-    let least = if mean > 0.0 { 0.0 } else { power };
-    smooth
-        .iter()
-        .map(|p| (p * more).max(least).sqrt())
-        .collect()
-}
-
-/// Variance of H1 at a line from the scatter between blocks.
-fn variance(set: &Set, line: usize) -> f64 {
-    let (mut xx, mut yy, mut xy) = (0.0, 0.0, Complex64::ZERO);
-    for block in &set.blocks {
-        let (x, y) = (block.applied[line], block.measured[line]);
-        xx += x.norm_sqr();
-        yy += y.norm_sqr();
-        xy += x.conj() * y;
-    }
-    if xx == 0.0 {
-        return 0.0;
-    }
-    let left = (yy - xy.norm_sqr() / xx).max(0.0);
-    left / (set.blocks.len() - 1) as f64 / xx
 }
 
 /// Re(J̄ᵀ Γ J).
@@ -401,7 +355,7 @@ fn gathered(set: &Set, lines: &Lines, solved: &Linearised, sizes: &[f64]) -> DMa
 }
 
 /// d(lag): Σ w² e^{−j2π lag i/n} over Σ w².
-fn line_correlation(window: Window, lag: usize, length: usize) -> Complex64 {
+pub(super) fn line_correlation(window: Window, lag: usize, length: usize) -> Complex64 {
     match (window, lag) {
         (_, 0) => Complex64::ONE,
         (Window::Hann, 1) => Complex64::new(-2.0 / 3.0, 0.0),
