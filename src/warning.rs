@@ -45,6 +45,8 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["order-or-mains", "an order of the shaft coincides with a line of the mains", "record at another speed"],
         ["orders-beyond-band", "orders lie above the band of a compensated record", "compensate with a higher --band, or give the recorded channel and --stand"],
         ["orders-above-nyquist", "orders above half the sampling rate were left out", "record at a higher rate"],
+        ["amplitude-changes", "the amplitude of a component changes over the record, so the components are averages", "select a shorter part with --range"],
+        ["lines-between-orders", "strong lines lie between the orders: the given fundamental may be a multiple of the speed", "give --fundamental as the speed, or add the orders"],
         ["speed-changes", "the speed changes or fluctuates over the record, so the components are averages", "select a part of constant speed with --range"],
         ["phase-hidden", "the signal at the frequency of a line, or of spikes, masks its phase, so part of it remains", "record without excitation at this frequency"],
         ["resonance-elsewhere", "the record shows no resonance at the declared frequency, but one nearby", "determine the stand's constants with identify decay"],

@@ -239,3 +239,115 @@ fn repeated_rounding_is_in_the_uncertainty() {
     let off = (squares / f64::from(count)).sqrt();
     assert!((0.2..2.0).contains(&off), "{off} standard uncertainties");
 }
+
+/// 4 s of orders 1, 2 and 3 of a frequency that rises evenly by a fraction, with a second order that grows evenly by a
+/// factor.
+fn changing(frequency_hz: f64, rise: f64, growth: f64) -> String {
+    let mut noise = Noise(31);
+    let samples: Vec<f64> = (0..8000)
+        .map(|i| {
+            let (t, part) = (f64::from(i) / 2000.0, f64::from(i) / 8000.0);
+            let angle = TAU * frequency_hz * t * (1.0 + 0.5 * rise * part);
+            let second = 0.5 * (1.0 + (growth - 1.0) * part);
+            let orders = [(1.0, 1.0), (2.0, second), (3.0, 0.4)];
+            let torque: f64 = orders.iter().map(|(k, a)| a * (k * angle).cos()).sum();
+            torque + 0.02 * (noise.uniform() - 0.5)
+        })
+        .collect();
+    record(&samples, 2000.0)
+}
+
+/// The message of each warning with this code.
+fn messages(report: &serde_json::Value, code: &str) -> Vec<String> {
+    let all = report["warnings"].as_array().expect("a list").iter();
+    let of_code = all.filter(|w| w["code"] == code);
+    of_code
+        .filter_map(|w| w["message"].as_str().map(str::to_owned))
+        .collect()
+}
+
+#[test]
+fn a_component_that_grows_is_said() {
+    let folder = Folder::new();
+    for (growth, is_said) in [(1.0, false), (1.1, false), (3.0, true), (0.5, true)] {
+        folder.write("in.csv", changing(47.3, 0.0, growth));
+        let more = ["47.3", "--orders", "1-3", "--json"];
+        let report = folder.json(&[&HARMONICS[..], &more].concat());
+        let told = messages(&report, "amplitude-changes");
+        assert_eq!(told.len(), usize::from(is_said), "{growth}: {told:?}");
+        assert!(
+            told.iter().all(|text| text.contains("order 2 ")),
+            "{told:?}"
+        );
+        assert!(messages(&report, "speed-changes").is_empty(), "{growth}");
+    }
+}
+
+/// The number after the first --fundamental in a message.
+fn advised(message: &str) -> f64 {
+    let (_, after) = message.split_once("--fundamental ").expect("advice");
+    let (number, _) = after.split_once(';').expect("an end");
+    number.parse().expect("a number")
+}
+
+/// The speed is a half or a third of the fundamental; an order that is asked for is not between the orders.
+#[test]
+fn a_multiple_of_the_speed_is_said() {
+    let folder = Folder::new();
+    folder.write("in.csv", changing(47.3, 0.0, 1.0));
+    for (fundamental, orders, speed) in [
+        ("47.3", "1-3", None),
+        ("94.6", "1-4", Some(47.3)),
+        ("95", "1-2", Some(47.3)),
+        ("141.9", "1-2", Some(47.3)),
+        ("94.6", "0.5,1,1.5", None),
+    ] {
+        let more = [fundamental, "--orders", orders, "--json"];
+        let report = folder.json(&[&HARMONICS[..], &more].concat());
+        let told = messages(&report, "lines-between-orders");
+        let is_right = match speed {
+            Some(speed) => told.len() == 1 && (advised(&told[0]) / speed - 1.0).abs() < 1e-5,
+            None => told.is_empty(),
+        };
+        assert!(is_right, "{fundamental}, {orders}: {told:?}");
+        assert!(
+            messages(&report, "speed-changes").is_empty(),
+            "{fundamental}"
+        );
+    }
+}
+
+/// Where no line between the orders shows the multiple, such as a single one elsewhere, nothing says that the speed
+/// changes: no order is there.
+#[test]
+fn orders_that_are_absent_are_no_changing_speed() {
+    let folder = Folder::new();
+    let mut noise = Noise(32);
+    let samples: Vec<f64> = (0..10_000)
+        .map(|i| (TAU * 25.3 * f64::from(i) / 1000.0).cos() + 0.02 * (noise.uniform() - 0.5))
+        .collect();
+    folder.write("in.csv", record(&samples, 1000.0));
+    for fundamental in ["50.6", "51"] {
+        let more = [fundamental, "--orders", "1-4", "--json"];
+        let report = folder.json(&[&HARMONICS[..], &more].concat());
+        assert!(
+            messages(&report, "speed-changes").is_empty(),
+            "{fundamental}"
+        );
+    }
+}
+
+#[test]
+fn a_speed_that_changes_cannot_be_refined() {
+    let folder = Folder::new();
+    folder.write("in.csv", changing(47.3, 0.05, 1.0));
+    let more = ["47.3", "--orders", "1-3", "--refine"];
+    let ran = folder.run(&[&HARMONICS[..], &more].concat());
+    assert_eq!(ran.code, 1);
+    assert!(
+        ran.stderr
+            .contains("the fundamental changes over the record, from 47."),
+        "{}",
+        ran.stderr
+    );
+}

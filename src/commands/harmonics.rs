@@ -1,7 +1,9 @@
 //! `harmonics`: component torques at a fundamental and its orders.
 
 mod filtered;
+mod level;
 mod mains;
+mod multiple;
 mod rounding;
 mod speed;
 mod text;
@@ -233,10 +235,13 @@ fn refined(
     found.map_err(|error| match error {
         Error::NotRefined { .. } => Failure::failed(
             ErrorCode::NotIdentifiable,
-            format_args!(
-                "{error}; --refine-span searches beyond {} % around it",
-                short(args.refine_span)
-            ),
+            match speed::warning(record, given_hz, orders) {
+                Some(changes) => changes.message,
+                None => format!(
+                    "{error}; --refine-span searches beyond {} % around it",
+                    short(args.refine_span)
+                ),
+            },
         ),
         other => other.into(),
     })
@@ -313,15 +318,32 @@ fn of_orders(
     let is_given = fundamental.std_hz.is_none();
     let load = speed::load_changes(record, hz, orders);
     // A load step leaves slow components that bias the speed slightly.
-    let off = is_given.then(|| speed::off(record, hz, orders, load.is_some()));
-    let off = off.flatten();
-    let changing = speed::warning(record, hz, orders);
-    let sways = (off.is_none() && changing.is_none())
+    let multiple = multiple::warning(record, hz, orders);
+    let off = (is_given && multiple.is_none())
+        .then(|| speed::off(record, hz, orders, load.is_some()))
+        .flatten();
+    let changing = match &multiple {
+        Some(_) => None,
+        None => speed::warning(record, hz, orders),
+    };
+    let is_steady = |others: [&Option<Warning>; 3]| others.iter().all(|found| found.is_none());
+    let sways = is_steady([&multiple, &off, &changing])
         .then(|| speed::sways(record, hz, orders))
+        .flatten();
+    let level = is_steady([&off, &changing, &sways])
+        .then(|| level::warning(record, hz, orders))
         .flatten();
     let is_compensated = way.stand.is_none();
     let beyond = is_compensated.then(|| filtered::warning(record, hz, orders));
-    let all = [off, changing, sways, load, beyond.flatten()];
+    let all = [
+        multiple,
+        off,
+        changing,
+        sways,
+        level,
+        load,
+        beyond.flatten(),
+    ];
     all.into_iter().flatten().collect()
 }
 

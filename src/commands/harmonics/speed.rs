@@ -12,11 +12,11 @@ use crate::warning::Warning;
 /// Number of parts of the record whose speeds are compared.
 const PARTS: usize = 4;
 /// Maximum number of samples evaluated in a part.
-const MOST: usize = 1 << 15;
+pub(super) const MOST: usize = 1 << 15;
 /// Minimum number of periods of the fundamental in a part.
-const FEWEST: f64 = 8.0;
+pub(super) const FEWEST: f64 = 8.0;
 /// Relative search ranges around the fundamental; the wider ones apply if it is not found.
-const SPAN: f64 = 0.05;
+pub(super) const SPAN: f64 = 0.05;
 const FAR_SPAN: f64 = 0.15;
 const WIDE_SPAN: f64 = 0.3;
 /// Significant difference of two speeds, in their standard uncertainties.
@@ -25,7 +25,7 @@ const SIGNIFICANT: f64 = 5.0;
 const TURNS: f64 = 0.2;
 
 /// Maximum number of samples for estimating the speed.
-const FIRST: usize = 1 << 17;
+pub(super) const FIRST: usize = 1 << 17;
 /// Significant energy lost by a wrong speed, over the residual power per sample at the right one.
 const LOST: f64 = 50.0;
 /// The same over the power of the components, if the load changes.
@@ -123,8 +123,8 @@ pub(super) fn warning(
     // A speed that is not found may change so fast that a line exists over a few periods only.
     let few = (FEWEST * record.rate_hz / fundamental_hz) as usize;
     let found = with(SPAN, length).or_else(|| with(WIDE_SPAN, few))?;
-    let attracted = found.iter().filter(|(_, is_attracted)| *is_attracted);
-    if 2 * attracted.count() > PARTS {
+    let misled = found.iter().filter(|(_, is_of_orders)| !is_of_orders);
+    if 2 * misled.count() > PARTS {
         return None;
     }
     let found: Vec<Fundamental> = found.into_iter().map(|(found, _)| found).collect();
@@ -150,8 +150,8 @@ pub(super) fn warning(
     })
 }
 
-/// The fundamental within a relative range around the given one, and whether it is not that of the orders but attracted
-/// by another line.
+/// The fundamental within a relative range around the given one, and whether it is that of the orders: not where none
+/// is significant, nor if it is attracted by another line.
 fn speed_in(
     samples: &[f64],
     rate_hz: f64,
@@ -164,8 +164,10 @@ fn speed_in(
     let at = |hz: f64| fit(samples, rate_hz, 0.0, Fundamental::given(hz), orders).ok();
     let both = at(given_hz).zip(at(found.frequency_hz));
     let duration_s = samples.len() as f64 / rate_hz;
-    let is_attracted = both.is_some_and(|(given, found)| is_attracted(&given, &found, duration_s));
-    Some((found, is_attracted))
+    let is_of_orders = both.is_none_or(|(given, found)| {
+        found.components.iter().any(is_sure) && !is_attracted(&given, &found, duration_s)
+    });
+    Some((found, is_of_orders))
 }
 
 /// Maximum and minimum number of windows for the angle of the shaft.
@@ -246,7 +248,7 @@ fn is_attracted(given: &Harmonics, found: &Harmonics, duration_s: f64) -> bool {
 }
 
 /// Whether a component is significant.
-fn is_sure(component: &Component) -> bool {
+pub(super) fn is_sure(component: &Component) -> bool {
     component.phasor.norm() > THERE * component.std_amplitude
 }
 

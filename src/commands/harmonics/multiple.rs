@@ -1,0 +1,103 @@
+//! Check that the fundamental is not a multiple of the speed.
+
+use torqcomp_dsp::harmonics::{Component, Fundamental, fit, refine_fundamental};
+use torqcomp_dsp::store::SampleStore;
+
+use super::speed::{FEWEST, FIRST, SPAN, highest, is_sure};
+use crate::print::{enumeration, rounded};
+use crate::recording::{Spool, UniformRecord};
+use crate::warning::Warning;
+
+/// Parts of the fundamental that may be the speed.
+const PARTS: [u32; 2] = [2, 3];
+/// Number of multiples of the speed that are searched, at most.
+const MULTIPLES: u32 = 8;
+/// Amplitude of a line between the orders, relative to the largest of all.
+const STRONG: f64 = 0.2;
+
+/// A warning if lines between the orders are multiples of half or a third of the fundamental.
+pub(super) fn warning(
+    record: &UniformRecord<Spool>,
+    fundamental_hz: f64,
+    orders: &[f64],
+) -> Option<Warning> {
+    let is_whole = |order: &f64| (order - order.round()).abs() < 1e-6;
+    let length = record.samples.count().min(FIRST);
+    let periods = length as f64 * fundamental_hz / record.rate_hz;
+    if !orders.iter().all(is_whole) || periods < FEWEST * f64::from(PARTS[1]) {
+        return None;
+    }
+    let samples = record.samples.part(0..length).ok()?;
+    let of_part = |part: &u32| of_part(&samples, record.rate_hz, (fundamental_hz, *part), orders);
+    PARTS.iter().find_map(of_part)
+}
+
+/// The warning about multiples of one part of the fundamental.
+fn of_part(
+    samples: &[f64],
+    rate_hz: f64,
+    (fundamental_hz, part): (f64, u32),
+    orders: &[f64],
+) -> Option<Warning> {
+    let start_hz = fundamental_hz / f64::from(part);
+    let is_seen = |k: &u32| f64::from(*k) * start_hz * (1.0 + SPAN) < 0.5 * rate_hz;
+    let seen = (1..=MULTIPLES).filter(is_seen);
+    let (whole, between): (Vec<u32>, Vec<u32>) = seen.partition(|k| k % part == 0);
+    let between: Vec<f64> = between.into_iter().map(f64::from).collect();
+    let found = refine_fundamental(samples, rate_hz, start_hz, SPAN, &between).ok()?;
+    let all: Vec<f64> = whole.into_iter().map(f64::from).chain(between).collect();
+    let speed = Fundamental::given(found.frequency_hz);
+    let fitted = fit(samples, rate_hz, 0.0, speed, &all).ok()?;
+    let size = |c: &Component| c.phasor.norm();
+    let largest = fitted.components.iter().map(size).fold(0.0, f64::max);
+    let is_between = |c: &&Component| c.order % f64::from(part) != 0.0;
+    let is_strong = |c: &&Component| is_sure(c) && size(c) > STRONG * largest;
+    let strong = fitted
+        .components
+        .iter()
+        .filter(is_between)
+        .filter(is_strong);
+    let strong: Vec<f64> = strong.map(|c| c.order).collect();
+    // A single line is a multiple by chance if it is not at the speed itself, or near it and the orders are there.
+    let resolution_hz = rate_hz / samples.len() as f64;
+    let is_exact = (found.frequency_hz - start_hz).abs() * highest(&strong) < resolution_hz;
+    let orders_are_there = || {
+        let given = fit(
+            samples,
+            rate_hz,
+            0.0,
+            Fundamental::given(fundamental_hz),
+            orders,
+        );
+        given.is_ok_and(|given| given.components.iter().any(is_sure))
+    };
+    let is_part = match strong.len() {
+        0 => false,
+        1 => strong[0] == 1.0 && (is_exact || !orders_are_there()),
+        _ => true,
+    };
+    is_part.then(|| said(&strong, (fundamental_hz, part), found.frequency_hz))
+}
+
+/// The warning about multiples of the speed.
+fn said(strong: &[f64], (fundamental_hz, part): (f64, u32), speed_hz: f64) -> Warning {
+    let list = |of: &dyn Fn(f64) -> String| {
+        let texts: Vec<String> = strong.iter().map(|k| of(*k)).collect();
+        enumeration(&texts, "and")
+    };
+    let (lines, order) = match strong.len() {
+        1 => ("a strong line lies", "order"),
+        _ => ("strong lines lie", "orders"),
+    };
+    Warning::new(
+        "lines-between-orders",
+        format!(
+            "{lines} between the orders of {} Hz, at {} Hz: if the speed is {speed} Hz, give --fundamental {speed}; \
+             otherwise add {order} {} to --orders",
+            rounded(fundamental_hz, 7),
+            list(&|k| rounded(k * speed_hz, 5)),
+            list(&|k| rounded(k / f64::from(part), 4)),
+            speed = rounded(speed_hz, 7),
+        ),
+    )
+}
