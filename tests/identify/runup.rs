@@ -211,3 +211,26 @@ fn a_run_in_one_direction_does_not_invent_a_dry_friction() {
         ),
     }
 }
+
+/// An absolute encoder that begins again after each turn, or after each quarter or two turns.
+#[test]
+fn an_angle_that_wraps_is_continued() {
+    let (angles, torques) = record(40.0, &mut Noise(41));
+    let options = runup::RunupOptions::default();
+    let whole = runup::identify(&turning(&angles, &torques), &options).unwrap();
+    let found = |wrap: f64| {
+        let wrapped: Vec<f64> = angles.iter().map(|angle| angle.rem_euclid(wrap)).collect();
+        runup::identify(&turning(&wrapped, &torques), &options)
+    };
+    for turns in [1.0, 2.0] {
+        let found = found(turns * TAU).unwrap();
+        for name in NAMES {
+            let (own, other) = (of(&found, name).value(), of(&whole, name).value());
+            assert!((own / other - 1.0).abs() < 1e-6, "{name}: {own} {other}");
+        }
+        assert!(found.method.iter().any(|line| line.contains("wraps")));
+        assert!(found.warnings.iter().all(|w| w.code != "poor-fit"));
+    }
+    let refused = found(0.4 * TAU).unwrap_err().to_string();
+    assert!(refused.contains("wraps and cannot be made"), "{refused}");
+}

@@ -17,6 +17,7 @@ mod regression;
 mod scatter;
 mod turns;
 mod windows;
+mod wrapped;
 
 use super::{FitQuality, Identification, Motion, NamedEstimates, rms};
 use crate::failure::Failure;
@@ -92,6 +93,11 @@ const SHORTEST_HALF: usize = 8;
 /// If the record is too short, contains no motion, or the channels differ in length.
 pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification, Failure> {
     check::check(run)?;
+    let (motion, wraps) = wrapped::continuous(run)?;
+    let run = &FreeRun {
+        motion: &motion,
+        ..*run
+    };
     let directions = Directions::of(run)?;
     let split = options.by_direction && directions.both();
     let half = match options.half_window_s {
@@ -108,6 +114,7 @@ pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification,
         unit: run.body.effort().to_owned(),
         relative: left / rms(&fitted.rows.right),
     });
+    result.method.extend(wrapped::method(wraps));
     present::method(&mut result, run, &fitted);
     present::draw(&mut result, run, &fitted);
     present::warnings(&mut result, run, &directions, options, &fitted);
