@@ -83,7 +83,7 @@ fn an_effect_is_named_added_and_simulated() {
     ]);
     assert_eq!(simulated.code, 0, "{}", simulated.stderr);
     let (head, rows) = table(&folder.read("simulated.csv"));
-    assert_eq!(head, ["time_s", "measured"]);
+    assert_eq!(head, ["time_s", "measured [N m]"]);
     // The initial motion has decayed after 50 ms.
     let settled = 1000..KEPT - 40;
     let squares = settled

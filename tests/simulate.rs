@@ -242,3 +242,54 @@ fn resampling_says_what_it_bridged() {
     );
     assert_eq!(report["samples"], 3000);
 }
+
+/// The heading of the result has its unit, so that compensate reads it without --unit.
+#[test]
+fn the_record_can_be_compensated_as_it_is() {
+    let applied = input(7, 4000);
+    let rows = |heading: &str| {
+        let mut text = format!("time [s],{heading}\n");
+        for (i, u) in applied.iter().enumerate() {
+            let _ = writeln!(text, "{:.6},{u:.9}", i as f64 / RATE_HZ);
+        }
+        text
+    };
+    for (heading, more, unit) in [
+        ("torque [N m]", &[][..], "N m"),
+        ("torque_mNm", &["--applied", "torque"], "mN m"),
+        ("torque", &["--unit", "N m"], "N m"),
+    ] {
+        let folder = Folder::new();
+        folder.write("stand.toml", STAND);
+        folder.write("in.csv", rows(heading));
+        let simulate = [
+            "simulate",
+            "in.csv",
+            "--stand",
+            "stand.toml",
+            "-o",
+            "out.csv",
+        ];
+        let ran = folder.run(&[&simulate[..], more].concat());
+        assert_eq!(ran.code, 0, "{heading}: {}", ran.stderr);
+        let (head, simulated) = table(&folder.read("out.csv"));
+        assert_eq!(head[1], format!("measured [{unit}]"));
+        let compensate = [
+            "compensate",
+            "out.csv",
+            "--stand",
+            "stand.toml",
+            "-o",
+            "back.csv",
+        ];
+        let ran = folder.run(&compensate);
+        assert_eq!(ran.code, 0, "{heading}: {}", ran.stderr);
+        let (_, back) = table(&folder.read("back.csv"));
+        assert_eq!(back.len(), simulated.len());
+        let scale = if unit == "mN m" { 1e-3 } else { 1.0 };
+        for i in 1500..2500 {
+            let error = back[i][1] - scale * applied[i];
+            assert!(error.abs() < 0.02 * scale, "{heading} {i}: {error}");
+        }
+    }
+}

@@ -197,7 +197,7 @@ pub fn column(text: &str, name: &str) -> Vec<f64> {
     let (head, rows) = table(text);
     let place = head
         .iter()
-        .position(|h| h == name)
+        .position(|h| h == name || h.split_once(" [").is_some_and(|(own, _)| own == name))
         .unwrap_or_else(|| panic!("{name} in {head:?}"));
     rows.iter().map(|row| row[place]).collect()
 }

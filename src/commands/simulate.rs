@@ -72,7 +72,7 @@ pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
     let chain = stand.chain()?;
     let between = args.between.into();
     let axis = applied.axis();
-    output.write(b"time_s,measured\n")?;
+    output.write(format!("time_s,measured [{}]\n", units.measured_text).as_bytes())?;
     let mut written = 0;
     let mut deliver = |simulated: &mut Vec<f64>| {
         units.record(simulated, stand.diagnosed.offset)?;
