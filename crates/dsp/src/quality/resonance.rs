@@ -78,20 +78,20 @@ pub fn other_resonance(
     let powers = (finest.saturating_sub(RESOLUTIONS - 1)..=finest).rev();
     powers.filter(|power| *power <= longest).find_map(|power| {
         let density = welch(samples, rate_hz, 1 << power).ok()?;
-        let shape = Shape::of(&density, [from_hz, to_hz])?;
-        shape.other_resonance(declared)
+        let spectrum = LogSpectrum::of(&density, [from_hz, to_hz])?;
+        spectrum.other_resonance(declared)
     })
 }
 
 /// Logarithm of a spectrum in bands, without the smooth functions that an input may have.
-struct Shape {
+struct LogSpectrum {
     frequency_hz: Vec<f64>,
     log_power: Vec<f64>,
     /// The smooth functions, orthonormal.
     smooth: Vec<Vec<f64>>,
 }
 
-impl Shape {
+impl LogSpectrum {
     /// `None` if too few bands are above the noise.
     fn of(density: &Density, [from_hz, to_hz]: [f64; 2]) -> Option<Self> {
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
@@ -119,23 +119,23 @@ impl Shape {
     fn new(frequency_hz: Vec<f64>, log_power: Vec<f64>) -> Self {
         let scale_hz = frequency_hz[frequency_hz.len() / 2];
         let functions: [fn(f64) -> f64; 3] = [|_| 1.0, f64::ln, |r| r * r];
-        let mut shape = Self {
+        let mut spectrum = Self {
             frequency_hz,
             log_power,
             smooth: Vec::new(),
         };
         for function in functions {
-            let mut column: Vec<f64> = shape
+            let mut column: Vec<f64> = spectrum
                 .frequency_hz
                 .iter()
                 .map(|hz| function(hz / scale_hz))
                 .collect();
-            shape.clear(&mut column);
+            spectrum.clear(&mut column);
             let size = dot(&column, &column).sqrt();
             column.iter_mut().for_each(|x| *x /= size);
-            shape.smooth.push(column);
+            spectrum.smooth.push(column);
         }
-        shape
+        spectrum
     }
 
     /// Removes the smooth functions.
