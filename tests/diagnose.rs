@@ -190,14 +190,22 @@ fn is_unexplained(report: &serde_json::Value, says: &str) {
 }
 
 #[test]
-fn spikes_are_neither_noise_nor_an_effect() {
+fn spikes_are_an_effect_only_at_equal_intervals() {
     let case = make(7, "none", 1).expect("the catalogue has it");
     // The last are weak, and so many that a line at their rate explains some of them.
     for (spacing, height) in [(613, 40.0), (83, 7.0)] {
         let height = height * noise_rms(&case);
-        let report = changed(&case, |_, row, y| {
-            y + if row % spacing == 30 { height } else { 0.0 }
-        });
+        let with_spikes = |place: fn(usize) -> usize| {
+            changed(&case, |_, row, y| {
+                let is_spike = row % spacing == place(row / spacing) % spacing;
+                y + if is_spike { height } else { 0.0 }
+            })
+        };
+        let report = with_spikes(|_| 30);
+        println!("{}: {}", report["verdict"], report["residual"]["described"]);
+        assert_eq!(report["effects"], serde_json::json!(["commutation-spikes"]));
+        // One at any place of each interval.
+        let report = with_spikes(|interval| 7919 * interval * interval);
         is_unexplained(&report, "spikes");
     }
 }
