@@ -142,8 +142,8 @@ fn found<'a>(
     }
     let (found, beginnings) = anew::cut(found, stretches, (wanted, lines))?;
     let is_split = found.fit.poles.len() > 1 || !beginnings.is_empty();
-    if (is_split || dependence::is_dry(&found.fit, stretches)?)
-        && wanted.count.is_none_or(|modes| modes == 1)
+    if wanted.count.is_none_or(|modes| modes == 1)
+        && (is_split || dependence::is_dry(&found.fit, stretches)?)
         && let Some(moving) = one_mode::instead((&found.fit, stretches), &recorded, wanted)?
     {
         return Ok(with_friction(moving, stretches));
