@@ -8,9 +8,9 @@ use std::sync::Arc;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use num_complex::Complex64;
-use torqcomp::digits::{self, Digits};
 use torqcomp::io::Reading;
 use torqcomp::recording::text::{ChannelRows, StampUse, TextFile};
+use torqcomp_decimal::{Digits, digits};
 use torqcomp_dsp::band::Band;
 use torqcomp_dsp::bridge::{ArmLaw, Bridge, BridgeLayout, Supply};
 use torqcomp_dsp::compensate::{BlockConvolver, InverseFilter, whole_record};

@@ -15,9 +15,9 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use torqcomp_decimal::Digits;
 use torqcomp_model::UnitSystem;
 
-use crate::digits::Digits;
 use crate::failure::Failure;
 use crate::file_name;
 use crate::io::output::{Output, Policy};

@@ -5,7 +5,6 @@ mod chart;
 mod cli;
 mod commands;
 mod diagnose;
-pub mod digits;
 #[cfg(test)]
 mod docs_tests;
 pub mod failure;

@@ -6,9 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use torqcomp_decimal::digits;
 use unicode_width::UnicodeWidthStr;
-
-use crate::digits;
 
 /// A JSON document, indented, with a line end.
 ///

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use torqcomp_decimal::Digits;
 use torqcomp_model::simulate;
 
 use super::{BatchOptions, OutputArgs, Strictness, digits};
-use crate::digits::Digits;
 use crate::io::Reading;
 
 /// Arguments of `simulate`.

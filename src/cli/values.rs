@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::digits::Digits;
+use torqcomp_decimal::Digits;
+
 use crate::failure::did_you_mean;
 use crate::file_name::{self, ShowPath, is_dash};
 use crate::io::positive_frequency;

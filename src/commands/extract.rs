@@ -1,11 +1,12 @@
 //! `extract`: one channel of a recording as plain rows, for other programs.
 
+use torqcomp_decimal::Text;
+
 use super::rows::{self, Rows, Times};
 use super::{judged, warned};
 use crate::cli::{Extract, OneChannel};
 use crate::failure::Failure;
 use crate::io::output::Output;
-use crate::io::text::Text;
 use crate::io::{COMPENSATED, Input, Reading, names_compensated};
 use crate::outcome::{Made, RecordFigures};
 use crate::print;

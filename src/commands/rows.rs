@@ -2,16 +2,12 @@
 
 use std::ops::Range;
 
-use crate::digits::{self, Decimal, Digits};
+use torqcomp_decimal::{Digits, Span, Text, digits, number};
+
 use crate::failure::Failure;
 use crate::io::output::Output;
-use crate::io::text::Text;
 use crate::recording::moment::Moment;
-use crate::recording::text::place_of;
 use crate::recording::{Block, StampGrid};
-
-/// Number of rows whose numbers are decomposed together.
-const ROWS_TOGETHER: usize = 8;
 
 /// Writes the rows of a result: time, torque and, if requested, the recorded torque.
 pub(super) struct Rows<'a> {
@@ -25,7 +21,7 @@ pub(super) struct Rows<'a> {
 /// Source of the text of the time column.
 pub(super) enum Times<'a> {
     /// Copied from the input.
-    Copied { text: &'a [u8], spans: &'a [u64] },
+    Copied { text: &'a [u8], spans: &'a [Span] },
     /// Time stamps in another unit, multiplied by seconds per unit.
     Stamps { times: &'a [f64], seconds: f64 },
     /// Time stamps relative to an origin.
@@ -120,63 +116,24 @@ impl Rows<'_> {
 
     /// Appends the rows of `torque`, with `recorded` if not empty.
     pub(super) fn write(&self, out: &mut Text, torque: &[f64], recorded: &[f64]) {
-        let time_digits = self.time_digits(torque.len());
-        let Digits::Significant(count) = self.digits else {
-            for (i, value) in torque.iter().enumerate() {
-                self.write_time(out, i, time_digits);
-                out.number(value * self.scale, self.digits);
-                self.end_row(out, recorded.get(i));
-            }
-            return;
-        };
-        if count == digits::DEFAULT_COUNT {
-            // The same code, with the number of digits known at compile time.
-            self.write_rows(out, torque, recorded, digits::DEFAULT_COUNT, time_digits);
-        } else {
-            self.write_rows(out, torque, recorded, count, time_digits);
-        }
-    }
-
-    #[inline(always)]
-    fn write_rows(
-        &self,
-        out: &mut Text,
-        torque: &[f64],
-        recorded: &[f64],
-        count: u32,
-        time_digits: Digits,
-    ) {
-        for (values, first) in torque
-            .chunks(ROWS_TOGETHER)
-            .zip((0..).step_by(ROWS_TOGETHER))
+        if let (Times::Copied { text, spans }, Digits::Significant(count), []) =
+            (&self.times, self.digits, recorded)
         {
-            let mut decimals = [Decimal::of(0.0, count); ROWS_TOGETHER];
-            for (decimal, value) in decimals.iter_mut().zip(values) {
-                *decimal = Decimal::of(value * self.scale, count);
-            }
-            let decimals = &decimals[..values.len()];
-            if let (Times::Copied { text, spans }, true) = (&self.times, recorded.is_empty()) {
-                for (decimal, span) in decimals.iter().zip(&spans[first..]) {
-                    let (offset, length) = place_of(*span);
-                    out.row(text, offset, length, decimal);
-                }
-                continue;
-            }
-            for (decimal, i) in decimals.iter().zip(first..) {
-                self.write_time(out, i, time_digits);
-                out.decimal(decimal);
-                self.end_row(out, recorded.get(i));
-            }
+            out.rows((text, spans), (torque, self.scale), count);
+            return;
+        }
+        let time_digits = self.time_digits(torque.len());
+        for (i, value) in torque.iter().enumerate() {
+            self.write_time(out, i, time_digits);
+            out.number(value * self.scale, self.digits);
+            self.end_row(out, recorded.get(i));
         }
     }
 
     #[inline]
     fn write_time(&self, out: &mut Text, i: usize, digits: Digits) {
         match &self.times {
-            Times::Copied { text, spans } => {
-                let (offset, length) = place_of(spans[i]);
-                out.copy(text, offset, length);
-            }
+            Times::Copied { text, spans } => out.copy(text, spans[i]),
             Times::Stamps { times, seconds } => out.number(times[i] * seconds, digits),
             Times::Counted { times, grid } => out.seconds(grid.nanoseconds(times[i])),
             Times::Grid { start, first } => match start.origin_ns {
@@ -215,8 +172,7 @@ impl Rows<'_> {
     pub(super) fn time_s(&self, i: usize) -> f64 {
         match &self.times {
             Times::Copied { text, spans } => {
-                let (offset, _) = place_of(spans[i]);
-                crate::io::number::read(text, offset, b'.').map_or(f64::NAN, |(value, _)| value)
+                number::read(text, spans[i].offset(), b'.').map_or(f64::NAN, |(value, _)| value)
             }
             Times::Stamps { times, seconds } => times[i] * seconds,
             Times::Counted { times, grid } => grid.nanoseconds(times[i]) as f64 * 1e-9,

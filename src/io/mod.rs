@@ -5,7 +5,6 @@ mod input;
 pub(crate) mod json_lines;
 mod mark;
 pub mod mcap;
-pub mod number;
 pub mod output;
 pub(crate) mod packed;
 mod parts;
@@ -13,7 +12,6 @@ mod reading;
 mod standard_output;
 pub(crate) mod storage;
 pub(crate) mod sum;
-pub mod text;
 
 pub use input::Input;
 pub(crate) use input::{HEAD, MCAP_START};

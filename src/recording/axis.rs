@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
+use torqcomp_decimal::digits;
 use torqcomp_dsp::quality::broken_line::BrokenLine;
 use torqcomp_dsp::quality::rounding::{Rounded, uniform_line};
 
 use super::Hole;
 use super::moment::Moment;
 use super::stamps::StampGrid;
-use crate::digits;
 
 /// Largest relative deviation of a step from the typical one in a record with a rate.
 const USUAL: f64 = 0.25;

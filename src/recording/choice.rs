@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use torqcomp_decimal::digits;
 use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
 use torqcomp_model::Unit;
 
@@ -9,7 +10,6 @@ use super::axis::{REVERSED, UNIFORM, falls, step_of};
 use super::moment::Moment;
 use super::text::CELLS_WITH_UNITS;
 use super::{Channel, Hole, HoleKind, RateFrom, Recording, check_holes, check_size, formats};
-use crate::digits;
 use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading};
 use crate::print::{enumeration, list, plural};

@@ -1,11 +1,11 @@
 //! Breaks in time stamps when the user gave the rate: the samples before and after them are joined.
 
+use torqcomp_decimal::digits;
 use torqcomp_dsp::quality::broken_line::BrokenLine;
 
 use super::axis::{SampleStep, rounding, step_of};
 use super::stamps::{IrregularStep, StampGrid, first_missing, is_gap};
 use super::{Channel, RateFrom, TimeAxis};
-use crate::digits;
 use crate::io::Reading;
 use crate::print::plural;
 use crate::warning::Warning;

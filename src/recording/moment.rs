@@ -2,8 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
-
-use crate::digits;
+use torqcomp_decimal::digits;
 
 /// Nanoseconds of a second.
 const SECOND: i64 = 1_000_000_000;

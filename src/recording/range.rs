@@ -1,5 +1,7 @@
 //! Selection of a part of a record by its times.
 
+use torqcomp_decimal::number;
+
 use super::moment::Moment;
 use super::text::Clock;
 use super::{Channel, Recording, TimeAxis};
@@ -35,8 +37,7 @@ impl TimeBound {
 
     fn read(text: &str) -> Option<Self> {
         if let Ok(seconds) = text.parse::<f64>() {
-            let (after, _) =
-                crate::io::number::read_after(text.as_bytes(), 0, b'.', seconds as i64)?;
+            let (after, _) = number::read_after(text.as_bytes(), 0, b'.', seconds as i64)?;
             let ns =
                 (seconds.trunc() as i64).checked_mul(1_000_000_000)? + (after * 1e9).round() as i64;
             return seconds.is_finite().then_some(Self::Seconds { seconds, ns });

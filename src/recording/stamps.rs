@@ -1,5 +1,6 @@
 //! Grid of the stamps of streamed samples.
 
+use torqcomp_decimal::digits;
 use torqcomp_dsp::quality::broken_line::BrokenLine;
 
 use super::Channel;
@@ -8,7 +9,6 @@ use super::axis::{
 };
 use super::checkpoints::sharpened;
 use super::moment::Moment;
-use crate::digits;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
 use crate::print::plural;

@@ -1,5 +1,7 @@
 //! Faults of a channel, detected while its blocks pass in order.
 
+use torqcomp_decimal::digits;
+
 use super::TimeAxis;
 use super::block::{Block, BlockSource};
 use super::joined::JoinedBreaks;
@@ -317,8 +319,8 @@ impl StreamValidator {
                     "{}: the rate of the first rows is {} Hz, that of the whole record {} Hz on average; the rate of \
                      the first rows was used",
                     self.source,
-                    crate::digits::text(rate_hz, 7),
-                    crate::digits::text(rate_hz * samples / steps, 7)
+                    digits::text(rate_hz, 7),
+                    digits::text(rate_hz * samples / steps, 7)
                 ),
             ));
         }

@@ -1,5 +1,6 @@
 //! Conversion of a recorded channel to the applied quantity: unit, calibration, response.
 
+use torqcomp_decimal::digits;
 use torqcomp_dsp::conversion::Conversion;
 use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit, UnitSystem};
 
@@ -415,7 +416,7 @@ fn no_torque(channel: &str, named: &NamedUnit) -> Failure {
         let torque = size.map_or_else(
             |_| format!("as a force, write --unit \"{force}\""),
             |size| {
-                let size = crate::digits::text(size, 5);
+                let size = digits::text(size, 5);
                 format!("if it is a torque, give --unit \"{force}\" (1 {force} = {size} N m)")
             },
         );

@@ -1,12 +1,12 @@
 //! Writing the results of a diagnosis to a stand file.
 
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, value};
+use torqcomp_decimal::digits;
 
 use torqcomp_model::Estimate;
 
 use super::update::{COMMON, CORRELATIONS, MODES};
 use super::{Given, MODE_CORRELATIONS, Stand};
-use crate::digits;
 use crate::failure::{ErrorCode, Failure};
 use crate::print::unit_of_quotient;
 

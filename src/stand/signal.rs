@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use torqcomp_decimal::digits;
 use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit, UnitSystem};
 
 use super::section::Section;
@@ -148,7 +149,7 @@ impl TransducerSignal {
     #[must_use]
     pub fn text(self, value: f64) -> String {
         let (unit, factor) = self.usual_unit();
-        format!("{} {unit}", crate::digits::text(value / factor, 9))
+        format!("{} {unit}", digits::text(value / factor, 9))
     }
 
     /// A quantity of a stand file whose unit determines its signal.

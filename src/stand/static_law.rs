@@ -1,6 +1,7 @@
 //! Conversion of a transducer's or bridge's signal to torque: by the measured calibration, or by beam, gage and
 //! bridge.
 
+use torqcomp_decimal::digits;
 use torqcomp_dsp::bridge::{ArmLaw, Bridge, Supply};
 use torqcomp_dsp::conversion::{Conversion, ConversionError};
 use torqcomp_model::{Estimate, Kind, UnitSystem};
@@ -298,7 +299,7 @@ impl Stand {
         Ok(StaticLaw {
             described: format!(
                 "from drawing, gage and bridge: {} {}{of_signal} for small signals",
-                crate::digits::text(small, 5),
+                digits::text(small, 5),
                 Kind::Torque.unit(units)
             ),
             std: ConstantStd::of(self.of_drawing(signal)),

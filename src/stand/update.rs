@@ -1,6 +1,7 @@
 //! Writing results to a stand file, preserving the rest of it.
 
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
+use torqcomp_decimal::digits;
 use torqcomp_dsp::sort_by_number;
 use torqcomp_model::{Estimate, Kind};
 
@@ -62,7 +63,7 @@ impl Entry {
     /// A bare number with three digits.
     #[must_use]
     pub fn number(section: &'static str, key: &'static str, number: f64) -> Self {
-        Self::text(section, key, &crate::digits::text(number, 3))
+        Self::text(section, key, &digits::text(number, 3))
     }
 
     /// A text.
@@ -350,7 +351,7 @@ fn put(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<(), Fail
 
 /// Nine significant digits, more than any record can determine.
 fn number_text(number: f64) -> String {
-    crate::digits::text(number, 9)
+    digits::text(number, 9)
 }
 
 /// Whether a stand file defines the conversion of its record to torque.

@@ -1,23 +1,24 @@
 //! Records processed in memory: in one transform of the whole record, or by inverting effects that no filter
 //! describes.
 
+use torqcomp_decimal::Text;
 use torqcomp_dsp::band::Band;
 use torqcomp_dsp::compensate::{InverseFilter, whole_record};
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::quality::streamed::StreamedFaults;
+use torqcomp_dsp::quality::sums::SampleSums;
 use torqcomp_dsp::spectrum::{PowerSum, StreamedPower};
 use torqcomp_dsp::store::SampleStore;
 
 use super::above::{AboveBand, power_above};
 use super::report::CompensateReport;
 use super::sink::{Part, Sink};
-use super::statistics::{ResultSums, Sums};
+use super::statistics::ResultSums;
 use super::{Plan, Seen, refined};
 use crate::cli::Compensate;
 use crate::commands::convert;
 use crate::commands::rows::uniform_parts;
 use crate::failure::Failure;
-use crate::io::text::Text;
 use crate::quality::excerpt;
 use crate::recording::moment::Moment;
 use crate::recording::{Spool, UniformRecord};
@@ -49,7 +50,7 @@ pub(super) fn run(
     report.noise.record = noise(&record, &filter, scale)?;
     let mut sums = ResultSums::new(filter.half_length());
     let mut deliver = |first: usize, torque: &[f64], recorded: &[f64]| {
-        sums.push(torque, &Sums::of(torque));
+        sums.push(torque, &SampleSums::of(torque));
         let axis = (record.rate_hz, record.start);
         deliver(args, sink, axis, (first, scale), [torque, recorded])
     };
@@ -111,14 +112,14 @@ fn noise(
         return Ok(None);
     }
     let mut power = StreamedPower::new(block);
-    let mut sums = Sums::NONE;
+    let mut sums = SampleSums::default();
     record.samples.pass(0..count, &mut |_, piece| {
         let printed: Vec<f64> = piece.iter().map(|x| x * scale).collect();
         power.push(&printed);
-        sums.join(&Sums::of(piece));
+        sums.join(&SampleSums::of(piece));
     })?;
     let density = power.density(record.rate_hz);
-    let rms = sums.statistics(scale).rms;
+    let rms = sums.std().unwrap_or_default() * scale.abs();
     Ok(density.and_then(|density| RecordNoise::of(filter, &density, rms)))
 }
 

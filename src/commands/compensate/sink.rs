@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use torqcomp_decimal::digits;
+
 use super::Plan;
 use super::page::PageData;
 use super::plot::Traces;
@@ -220,7 +222,7 @@ fn provenance(
     report: &CompensateReport,
 ) -> Result<BTreeMap<String, String>, Failure> {
     let (_, stand) = stand::text(&args.stand)?;
-    let number = |value: f64| crate::digits::text(value, 12);
+    let number = |value: f64| digits::text(value, 12);
     let pairs = [
         (
             "tool",

@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use torqcomp_dsp::quality::sums::SampleSums;
 
 /// A result in figures, in its unit.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
@@ -29,6 +30,18 @@ pub(super) struct Extremes {
 }
 
 impl Statistics {
+    /// Statistics of the samples times `scale`; zeros if there are none.
+    fn of(sums: &SampleSums, scale: f64) -> Self {
+        let (smallest, largest) = sums.range().unwrap_or_default();
+        Self {
+            mean: sums.mean().unwrap_or_default() * scale,
+            rms: sums.std().unwrap_or_default() * scale.abs(),
+            smallest: smallest * scale,
+            largest: largest * scale,
+            inside: None,
+        }
+    }
+
     /// Largest absolute value away from both ends, or of the whole record if there is no such part.
     pub(super) fn peak(&self) -> f64 {
         let Extremes { smallest, largest } = self.inside.unwrap_or(Extremes {
@@ -36,73 +49,6 @@ impl Statistics {
             largest: self.largest,
         });
         largest.max(-smallest)
-    }
-}
-
-/// Sums and extremes of samples.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Sums {
-    count: f64,
-    sum: f64,
-    square: f64,
-    smallest: f64,
-    largest: f64,
-}
-
-impl Sums {
-    pub(super) fn of(values: &[f64]) -> Self {
-        // Several independent sums, which a processor can add in parallel.
-        const SIDE_BY_SIDE: usize = 8;
-        let (groups, rest) = values.as_chunks::<SIDE_BY_SIDE>();
-        let mut parts = [Self::NONE; SIDE_BY_SIDE];
-        for group in groups {
-            for (part, value) in parts.iter_mut().zip(group) {
-                part.take(*value);
-            }
-        }
-        let mut all = Self::NONE;
-        for part in &parts {
-            all.join(part);
-        }
-        rest.iter().for_each(|value| all.take(*value));
-        all.count = values.len() as f64;
-        all
-    }
-
-    pub(super) const NONE: Self = Self {
-        count: 0.0,
-        sum: 0.0,
-        square: 0.0,
-        smallest: f64::INFINITY,
-        largest: f64::NEG_INFINITY,
-    };
-
-    #[inline(always)]
-    fn take(&mut self, value: f64) {
-        self.sum += value;
-        self.square += value * value;
-        self.smallest = self.smallest.min(value);
-        self.largest = self.largest.max(value);
-    }
-
-    pub(super) fn join(&mut self, other: &Self) {
-        self.count += other.count;
-        self.sum += other.sum;
-        self.square += other.square;
-        self.smallest = self.smallest.min(other.smallest);
-        self.largest = self.largest.max(other.largest);
-    }
-
-    /// Statistics of the samples times `scale`.
-    pub(super) fn statistics(self, scale: f64) -> Statistics {
-        let mean = self.sum / self.count;
-        Statistics {
-            mean: mean * scale,
-            rms: (self.square / self.count - mean * mean).max(0.0).sqrt() * scale.abs(),
-            smallest: self.smallest * scale,
-            largest: self.largest * scale,
-            inside: None,
-        }
     }
 }
 
@@ -114,8 +60,8 @@ pub(super) struct ResultSums {
     skipped: usize,
     /// The last `edge` samples so far: the end, if no more come.
     last: Vec<f64>,
-    all: Sums,
-    inside: Sums,
+    all: SampleSums,
+    inside: SampleSums,
 }
 
 impl ResultSums {
@@ -124,35 +70,35 @@ impl ResultSums {
             edge,
             skipped: 0,
             last: Vec::new(),
-            all: Sums::NONE,
-            inside: Sums::NONE,
+            all: SampleSums::default(),
+            inside: SampleSums::default(),
         }
     }
 
     /// Takes the next samples with their sums.
-    pub(super) fn push(&mut self, values: &[f64], sums: &Sums) {
+    pub(super) fn push(&mut self, values: &[f64], sums: &SampleSums) {
         self.all.join(sums);
         let skipped = (self.edge - self.skipped).min(values.len());
         self.skipped += skipped;
         let values = &values[skipped..];
         let inside = (self.last.len() + values.len()).saturating_sub(self.edge);
         let before = inside.min(self.last.len());
-        self.inside.join(&Sums::of(&self.last[..before]));
+        self.inside.join(&SampleSums::of(&self.last[..before]));
         self.last.drain(..before);
         let (inside, last) = values.split_at(inside - before);
-        self.inside.join(&Sums::of(inside));
+        self.inside.join(&SampleSums::of(inside));
         self.last.extend(last);
     }
 
     /// Statistics of the samples times `scale`.
     pub(super) fn statistics(&self, scale: f64) -> Statistics {
-        let inside = self.inside.statistics(scale);
+        let inside = self.inside.range();
         Statistics {
-            inside: (self.inside.count > 0.0).then_some(Extremes {
-                smallest: inside.smallest,
-                largest: inside.largest,
+            inside: inside.map(|(smallest, largest)| Extremes {
+                smallest: smallest * scale,
+                largest: largest * scale,
             }),
-            ..self.all.statistics(scale)
+            ..Statistics::of(&self.all, scale)
         }
     }
 }
@@ -167,7 +113,7 @@ mod tests {
         for size in [1, 3, 7, 50, 100] {
             let mut sums = ResultSums::new(5);
             let pieces = values.chunks(size);
-            pieces.for_each(|piece| sums.push(piece, &Sums::of(piece)));
+            pieces.for_each(|piece| sums.push(piece, &SampleSums::of(piece)));
             let found = sums.statistics(2.0);
             assert_eq!((found.smallest, found.largest), (0.0, 198.0));
             let inside = Extremes {
@@ -181,7 +127,7 @@ mod tests {
             );
         }
         let mut short = ResultSums::new(50);
-        short.push(&values, &Sums::of(&values));
+        short.push(&values, &SampleSums::of(&values));
         assert_eq!(short.statistics(1.0).inside, None);
         assert_eq!(short.statistics(1.0).peak(), 99.0);
     }

@@ -2,23 +2,24 @@
 
 use std::collections::VecDeque;
 
+use torqcomp_decimal::Text;
 use torqcomp_dsp::band::Band;
 use torqcomp_dsp::compensate::{BlockConvolver, InverseFilter, Windows};
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::quality::streamed::StreamedFaults;
+use torqcomp_dsp::quality::sums::SampleSums;
 use torqcomp_dsp::resample::{Resampled, Resampler};
 use torqcomp_dsp::spectrum::{Density, PowerSum, welch_to_the_ends};
 
 use super::above::{AboveBand, power_above};
 use super::report::CompensateReport;
 use super::sink::{Part, Sink};
-use super::statistics::{ResultSums, Sums};
+use super::statistics::ResultSums;
 use super::{Plan, Seen};
 use crate::cli::Compensate;
 use crate::commands::convert;
 use crate::commands::rows::{Rows, Times};
 use crate::failure::Failure;
-use crate::io::text::Text;
 use crate::pipeline::{self, Stages};
 use crate::quality::excerpt;
 use crate::recording::moment::Moment;
@@ -45,7 +46,7 @@ struct Job {
     /// Mean square of the record above the band.
     above: Option<f64>,
     /// Of the result, and of the record.
-    sums: Option<[Sums; 2]>,
+    sums: Option<[SampleSums; 2]>,
 }
 
 /// Processing of each sample, the same on every thread.
@@ -69,7 +70,7 @@ struct Gathered<'a> {
     power: PowerSum,
     above: AboveBand,
     sums: ResultSums,
-    recorded: Sums,
+    recorded: SampleSums,
     /// The first samples as recorded: for the quality of the record, and for its noise where it is too short for a
     /// block of the estimate.
     first: Vec<f64>,
@@ -149,7 +150,7 @@ impl<'a> Gathered<'a> {
             power: PowerSum::new(steps.noise_block),
             above,
             sums: ResultSums::new(steps.half_length),
-            recorded: Sums::NONE,
+            recorded: SampleSums::default(),
             first: Vec::new(),
             faults: StreamedFaults::default(),
         }
@@ -187,7 +188,7 @@ impl<'a> Gathered<'a> {
         report.result = self.sums.statistics(steps.scale);
         if let Some(density) = self.density(steps.rate_hz) {
             let density = density.scaled(steps.scale * steps.scale);
-            let rms = self.recorded.statistics(steps.scale).rms;
+            let rms = self.recorded.std().unwrap_or_default() * steps.scale.abs();
             report.noise.record = RecordNoise::of(filter, &density, rms);
         }
         report.warnings.extend(self.above.warning(report));
@@ -311,7 +312,7 @@ impl Steps<'_> {
             power.add_samples(&job.window[self.half_length..self.half_length + length]);
         }
         job.above = self.watched.and_then(|band| power_above(power, band));
-        job.sums = Some([&job.torque[..], self.recorded(&job.window)].map(Sums::of));
+        job.sums = Some([&job.torque[..], self.recorded(&job.window)].map(SampleSums::of));
         job.text.clear();
         if !self.is_text {
             return;

@@ -1,12 +1,12 @@
 //! The refined stand file of a diagnosis.
 
+use torqcomp_decimal::digits;
 use torqcomp_model::Estimate;
 use torqcomp_model::effects::Unit;
 
 use crate::diagnose::{
     Diagnosis, EffectForm, EffectParameter, HeldBody, RecordResidual, ScoredModel,
 };
-use crate::digits;
 use crate::failure::Failure;
 use crate::identify::MODE_NUMBERS;
 use crate::stand::{self, Refined, Stand};

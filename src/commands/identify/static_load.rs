@@ -2,12 +2,12 @@
 
 use std::collections::HashMap;
 
+use torqcomp_decimal::digits;
 use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit};
 
 use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, unit_or};
 use crate::cli::identify::Static;
 use crate::commands::Outcome;
-use crate::digits;
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::ShowPath;
 use crate::identify::Identification;

@@ -3,11 +3,12 @@
 
 use std::io::Cursor;
 
+use torqcomp_decimal::digits;
+
 use super::bytes::{Bytes, Number, Order};
 use super::{
     Content, Format, channel, cut, damaged, is_time_name, names_left_out, plausible_rate, stamped,
 };
-use crate::digits;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
 use crate::recording::{TimeAxis, seconds_assumed};

@@ -1,8 +1,9 @@
 //! Content of a cell: a number (possibly with thousands separators), a date or time, a text,
 //! nothing.
 
+use torqcomp_decimal::number;
+
 use super::clock::Clock;
-use crate::io::number;
 
 /// Content of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]

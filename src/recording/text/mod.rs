@@ -56,10 +56,11 @@ use keys::Entry;
 pub use last_line::{LastLine, last_line};
 use makers::Maker;
 use rows::ColumnKind;
-pub use rows::{LineNotes, RowPlan, place_of};
+pub use rows::{LineNotes, RowPlan};
 pub use stream::{BRIDGE, ChannelPlan, ChannelRows, Problem, StampColumn, StampUse, TextStream};
 pub use table::Layout;
 use table::{FIRST_ROWS, Hints, ReadTable};
+use torqcomp_decimal::number;
 
 /// Number of bytes for detecting the encoding.
 const FOR_ENCODING: u64 = 1 << 16;
@@ -326,7 +327,7 @@ fn in_lines(text: &[u8], decimal: u8) -> Option<Vec<u8>> {
         .find(|mark| line.contains(mark))?;
     let cells = line.split(|byte| *byte == mark);
     let numbers = cells.clone().filter(|cell| !cell.is_empty()).all(|cell| {
-        std::str::from_utf8(cell).is_ok_and(|cell| crate::io::number::cell(cell, decimal).is_some())
+        std::str::from_utf8(cell).is_ok_and(|cell| number::cell(cell, decimal).is_some())
     });
     let is_one_line = !line.contains(&b'\n') && cells.count() >= ONE_LINE;
     (numbers && is_one_line).then(|| {

@@ -5,61 +5,29 @@
 //! expected, all digits of a run at once. A row that differs is parsed normally and becomes the
 //! next template. Both give bitwise equal results.
 
-use super::rows::{ColumnKind, RowPlan, span};
-use crate::io::number::{self, Parts};
+use torqcomp_decimal::{Pair, PairFormat};
+
+use super::rows::{ColumnKind, RowPlan};
 use crate::recording::text::dialect::Delimiter;
 
 /// Number of consecutive rows after which a changed template is replaced immediately.
 const STEADY: usize = 8;
 /// Maximum number of rows parsed normally before the next attempt.
 const LONGEST_PAUSE: usize = 64;
-/// Maximum number of digits parsed at once.
-const LONGEST_RUN: usize = 8;
-/// Number of digits up to which every number is exact as an `f64` times a power of ten.
-const MOST_DIGITS: usize = 15;
 
 /// Format of the two numbers of a row, as far as it is constant.
 #[derive(Debug)]
 pub(super) struct RowTemplate {
     /// Cell separator, if rows can have a template: two adjacent numbers at their start.
     separator: Option<u8>,
-    /// Which of the two is a stamp whose last bit does not matter.
-    stamp: Option<usize>,
-    shapes: Option<[Shape; 2]>,
+    /// Which of the two is a stamp whose text is copied.
+    copied: Option<usize>,
+    format: Option<PairFormat>,
     /// Number of rows that matched it.
     followed: usize,
     /// Number of rows until the next attempt.
     pause: usize,
     last_pause: usize,
-}
-
-/// A parsed row.
-pub(super) struct TemplateRow {
-    pub(super) values: [f64; 2],
-    pub(super) stamp_text: u64,
-    /// Start of the next line.
-    pub(super) end: usize,
-}
-
-/// Format of a number without its sign.
-#[derive(Debug, Clone, Copy)]
-struct Shape {
-    /// Number of digits before the decimal mark, 1 to 8.
-    whole: usize,
-    /// Number of digits after it; without a mark if 0.
-    fraction: usize,
-    /// The digits of the fraction, at most eight each.
-    runs: [Run; 2],
-    /// Whether `e`, a sign and two digits follow.
-    exponent: bool,
-}
-
-/// Digits parsed at once.
-#[derive(Debug, Clone, Copy)]
-struct Run {
-    digits: usize,
-    /// Ten to the power of the number of digits.
-    scale: u64,
 }
 
 impl RowTemplate {
@@ -70,43 +38,21 @@ impl RowTemplate {
                 Delimiter::Byte(mark) if is_pair => Some(mark),
                 _ => None,
             },
-            stamp: plan.stamps.filter(|_| plan.keeps_stamp_text),
-            shapes: None,
+            copied: plan.stamps.filter(|_| plan.keeps_stamp_text),
+            format: None,
             followed: 0,
             pause: 0,
             last_pause: 0,
         }
     }
 
-    /// The row at `at`, if it has the format of the preceding one.
-    #[inline(always)]
-    pub(super) fn row(&mut self, text: &[u8], at: usize, plan: &RowPlan) -> Option<TemplateRow> {
-        let shapes = self.shapes.as_ref()?;
-        let decimal = plan.dialect.decimal;
-        let (first, first_end) = shapes[0].read(text, at, decimal)?;
-        if text.get(first_end).copied() != self.separator {
-            return None;
-        }
-        let second_start = first_end + 1;
-        let (second, second_end) = shapes[1].read(text, second_start, decimal)?;
-        let end = plan.row_end(text, second_end)?;
-        let (values, stamp_text) = match self.stamp {
-            Some(0) => (
-                [first.nearly()?, second.exactly()?],
-                span(at, first_end - at),
-            ),
-            Some(_) => (
-                [first.exactly()?, second.nearly()?],
-                span(second_start, second_end - second_start),
-            ),
-            None => ([first.exactly()?, second.exactly()?], 0),
-        };
+    /// The row at `at`, if it has the format of the preceding one, and the start of the next line.
+    #[inline]
+    pub(super) fn row(&mut self, text: &[u8], at: usize, plan: &RowPlan) -> Option<(Pair, usize)> {
+        let pair = self.format.as_ref()?.read(text, at)?;
+        let end = plan.row_end(text, pair.end)?;
         self.followed += 1;
-        Some(TemplateRow {
-            values,
-            stamp_text,
-            end,
-        })
+        Some((pair, end))
     }
 
     /// Uses the row at `at`, which was parsed normally, as the next template.
@@ -119,112 +65,18 @@ impl RowTemplate {
             self.pause -= 1;
             return;
         }
-        self.last_pause = if self.followed >= STEADY || self.shapes.is_none() {
+        self.last_pause = if self.followed >= STEADY || self.format.is_none() {
             0
         } else {
             (2 * self.last_pause + 1).min(LONGEST_PAUSE)
         };
         self.followed = 0;
         self.pause = self.last_pause;
-        self.shapes = if self.pause == 0 {
-            Shape::of_row(text, at, separator, plan.dialect.decimal)
+        self.format = if self.pause == 0 {
+            PairFormat::of(text, at, separator, plan.dialect.decimal, self.copied)
         } else {
             None
         };
-    }
-}
-
-impl Shape {
-    /// Formats of the two numbers of a row.
-    #[cold]
-    fn of_row(text: &[u8], at: usize, separator: u8, decimal: u8) -> Option<[Self; 2]> {
-        let (first, end) = Self::of(text, at, decimal)?;
-        (text.get(end) == Some(&separator)).then_some(())?;
-        let (second, _) = Self::of(text, end + 1, decimal)?;
-        Some([first, second])
-    }
-
-    /// Format of the number at `at`, and its end.
-    fn of(text: &[u8], at: usize, decimal: u8) -> Option<(Self, usize)> {
-        let digits = |from: usize| {
-            let rest = text.get(from..).unwrap_or(&[]);
-            rest.iter().take_while(|byte| byte.is_ascii_digit()).count()
-        };
-        let start = at + usize::from(text.get(at) == Some(&b'-'));
-        let whole = digits(start);
-        let mut end = start + whole;
-        let mut fraction = 0;
-        if text.get(end) == Some(&decimal) {
-            fraction = digits(end + 1);
-            end += 1 + fraction;
-            if fraction == 0 {
-                return None;
-            }
-        }
-        let exponent = matches!(text.get(end), Some(b'e' | b'E'));
-        if exponent {
-            let signed = matches!(text.get(end + 1), Some(b'+' | b'-'));
-            if !signed || digits(end + 2) != 2 {
-                return None;
-            }
-            end += 4;
-        }
-        if !(1..=LONGEST_RUN).contains(&whole) || whole + fraction > MOST_DIGITS {
-            return None;
-        }
-        let first = fraction.min(LONGEST_RUN);
-        let shape = Self {
-            whole,
-            fraction,
-            runs: [first, fraction - first].map(Run::of),
-            exponent,
-        };
-        Some((shape, end))
-    }
-
-    /// The number at `at` if it has this format, and its end. The character there is not checked, as
-    /// the caller expects a separator.
-    #[inline(always)]
-    fn read(&self, text: &[u8], at: usize, decimal: u8) -> Option<(Parts, usize)> {
-        let negative = *text.get(at)? == b'-';
-        let start = at + usize::from(negative);
-        let mut end = start + self.whole;
-        let mut mantissa = match self.whole {
-            1 => number::digit(text, start)?,
-            count => number::run(text, start, count)?,
-        };
-        if self.fraction > 0 {
-            if *text.get(end)? != decimal {
-                return None;
-            }
-            let [first, second] = &self.runs;
-            mantissa = mantissa * first.scale + number::run(text, end + 1, first.digits)?;
-            if second.digits > 0 {
-                let more = number::run(text, end + 1 + LONGEST_RUN, second.digits)?;
-                mantissa = mantissa * second.scale + more;
-            }
-            end += 1 + self.fraction;
-        }
-        let mut exponent = -(self.fraction as i32);
-        if self.exponent {
-            exponent += number::two_digit_exponent(text, end)?;
-            end += 4;
-        }
-        let parts = Parts {
-            negative,
-            mantissa,
-            exponent,
-        };
-        Some((parts, end))
-    }
-}
-
-impl Run {
-    fn of(digits: usize) -> Self {
-        Self {
-            digits,
-            scale: 10_u64.pow(digits as u32),
-        }
     }
 }
 
@@ -235,6 +87,7 @@ mod tests {
     use super::*;
     use crate::recording::text::dialect::Dialect;
     use proptest::prelude::*;
+    use torqcomp_decimal::Span;
 
     const COMMA: Dialect = Dialect {
         delimiter: Delimiter::Byte(b','),
@@ -269,7 +122,8 @@ mod tests {
             for (all, more) in single.columns.iter_mut().zip(&line.columns) {
                 all.values.extend(&more.values);
             }
-            let moved = line.stamp_text.iter().map(|s| s + ((offset as u64) << 32));
+            let stamps = line.stamp_text.iter();
+            let moved = stamps.map(|span| Span::new(offset + span.offset(), span.length()));
             single.stamp_text.extend(moved);
             single.line = line.line;
             single.count += line.count;

@@ -8,12 +8,13 @@ mod cut;
 mod items;
 mod plain_row;
 
+use torqcomp_decimal::{Span, number};
+
 use super::blocks::TableEnd;
 use super::cell::{Cell, is_instruments_mark};
 use super::clock::Clock;
 use super::row_template::RowTemplate;
 use crate::failure::{ErrorCode, Failure};
-use crate::io::number;
 use crate::recording::text::dialect::{Dialect, decode_line, is_comment, is_skipped};
 use crate::recording::{Hole, HoleKind};
 use cut::line_of;
@@ -68,7 +69,7 @@ pub struct Rows {
     /// The columns.
     pub columns: Vec<Column>,
     /// Position of the text of each stamp: offset in the upper, length in the lower half.
-    pub stamp_text: Vec<u64>,
+    pub stamp_text: Vec<Span>,
     /// Number of rows.
     pub count: usize,
     /// Number of the next line.
@@ -182,13 +183,13 @@ impl Rows {
         if first.values.len() != row || second.values.len() != row {
             return at;
         }
-        while let Some(found) = template.row(text, at, plan) {
-            first.values.push(found.values[0]);
-            second.values.push(found.values[1]);
+        while let Some((pair, end)) = template.row(text, at, plan) {
+            first.values.push(pair.values[0]);
+            second.values.push(pair.values[1]);
             if plan.keeps_stamp_text {
-                self.stamp_text.push(found.stamp_text);
+                self.stamp_text.push(pair.copied);
             }
-            at = found.end;
+            at = end;
         }
         let count = first.values.len() - row;
         if count > 0 {
@@ -261,7 +262,7 @@ impl Rows {
             let cell = cell.map_or(&b""[..], |cell| cell.as_bytes());
             let found = memchr::memmem::find(line, cell);
             self.stamp_text
-                .push(found.map_or(0, |offset| span(at + offset, cell.len())));
+                .push(found.map_or(Span::default(), |offset| Span::new(at + offset, cell.len())));
         }
         self.count += 1;
         true
@@ -446,19 +447,6 @@ fn is_damaged_row(text: &str, cells: &[Cell]) -> bool {
     text.starts_with(|c: char| c.is_ascii_digit())
         && !text.chars().any(char::is_alphabetic)
         && !cells.iter().any(|cell| matches!(cell, Cell::Clock(_)))
-}
-
-/// Offset and length of a text packed in one number.
-#[inline]
-pub(super) fn span(offset: usize, length: usize) -> u64 {
-    (offset as u64) << 32 | length as u64
-}
-
-/// Offset and length of the text of a stamp.
-#[inline]
-#[must_use]
-pub fn place_of(span: u64) -> (usize, usize) {
-    ((span >> 32) as usize, (span & 0xFFFF_FFFF) as usize)
 }
 
 /// Position after the line feed that ends the line at `at`.

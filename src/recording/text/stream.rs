@@ -1,5 +1,7 @@
 //! Streaming of one channel of a table.
 
+use torqcomp_decimal::{Span, number};
+
 use super::axes::Role;
 use super::cell::{is_instruments_mark, is_non_finite};
 use super::chunks::Chunks;
@@ -7,7 +9,6 @@ use super::clock::unwrap_midnights;
 use super::last_line::shortened;
 use super::rows::{ColumnKind, LineNotes, RowPlan, Rows};
 use super::table::Layout;
-use crate::io::number;
 
 /// Advice for a missing number.
 pub const BRIDGE: &str = "bridge it with --fill linear or --fill hold, or correct the line";
@@ -74,7 +75,7 @@ pub struct ChannelRows {
     /// Time stamps as written (in the file's unit); empty without a time column.
     pub times: Vec<f64>,
     /// Position of the text of each time stamp: offset in the upper, length in the lower half.
-    pub time_text: Vec<u64>,
+    pub time_text: Vec<Span>,
     /// The channel's values as written.
     pub values: Vec<f64>,
     /// Number of lines seen, rows and others.

@@ -3,9 +3,10 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use torqcomp_decimal::digits;
+
 use super::objects::{Properties, Property, TdmsObject, TdmsObjects};
 use super::scales;
-use crate::digits;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
 use crate::recording::formats::{Content, NAMED, channel, names_left_out, plausible_rate, stamped};

@@ -8,9 +8,10 @@ mod lines;
 
 use self::head::{Head, field};
 use self::lines::{Lines, numbers_of};
+use torqcomp_decimal::digits;
+
 use super::bytes::{Bytes, Order};
 use super::{Content, Format, channel, cut, stamped};
-use crate::digits;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
 use crate::recording::{Channel, TimeAxis};

@@ -4,10 +4,11 @@
 
 use std::sync::Arc;
 
+use torqcomp_decimal::number;
+
 use super::{Maker, Rule};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
-use crate::io::number;
 use crate::recording::moment::Moment;
 use crate::recording::text::Clock;
 use crate::recording::text::chunks::Chunks;

@@ -2,9 +2,11 @@
 //! between them in s, and the trigger position, in whole samples and a fraction (TDS Family programmer manual,
 //! SAVe:WAVEform:FILEFormat).
 
+use torqcomp_decimal::number;
+
 use super::{Maker, Rule};
 use crate::failure::{ErrorCode, Failure};
-use crate::io::{Reading, number};
+use crate::io::Reading;
 use crate::recording::text::FOR_MAKER;
 use crate::recording::text::chunks::Chunks;
 use crate::recording::text::dialect::{Delimiter, Dialect};

@@ -2,10 +2,11 @@
 //! above `Sequence,Volt,Volt,-3.5e-03,5e-06`; the first column is an index. Other formats of this maker
 //! are plain tables.
 
+use torqcomp_decimal::number;
+
 use super::{Maker, Rule};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
-use crate::io::number;
 use crate::recording::text::FOR_MAKER;
 use crate::recording::text::chunks::Chunks;
 use crate::recording::text::dialect::{Delimiter, Dialect};

@@ -4,6 +4,8 @@
 
 use std::sync::Arc;
 
+use torqcomp_decimal::number;
+
 use super::{Maker, Rule};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
@@ -52,7 +54,7 @@ fn side_by_side(head: &Head) -> Option<(Dialect, Vec<usize>, usize)> {
         let number = |place: usize| {
             cells
                 .get(place)
-                .is_some_and(|cell| crate::io::number::cell(cell, decimal).is_some())
+                .is_some_and(|cell| number::cell(cell, decimal).is_some())
         };
         let blocks: Vec<usize> = (0..cells.len())
             .filter(|place| cells[*place].eq_ignore_ascii_case("Record Length"))

@@ -1,7 +1,8 @@
 //! Single-pass parsing of a row of plain numbers.
 
-use super::{ColumnKind, RowPlan, Rows, line_end, span};
-use crate::io::number;
+use torqcomp_decimal::{Span, number};
+
+use super::{ColumnKind, RowPlan, Rows, line_end};
 use crate::recording::text::clock::Clock;
 use crate::recording::text::dialect::Delimiter;
 
@@ -49,7 +50,7 @@ impl Rows {
             let is_copied = plan.keeps_stamp_text && plan.stamps == Some(place);
             let (value, end) = plan.cell(text, at, *kind, is_copied)?;
             if is_copied {
-                self.stamp_text.push(span(at, end - at));
+                self.stamp_text.push(Span::new(at, end - at));
             }
             if let Some(value) = value {
                 self.push(place, value);

@@ -37,13 +37,12 @@ const SMALLEST_PLAIN: i32 = -5;
 
 /// Buffer size for one number: 17 digits, sign, point, leading zeros or exponent, and the slack for
 /// copies of fixed length.
-pub const ROOM: usize = 48;
+pub(crate) const ROOM: usize = 48;
 
 /// Appends a finite number.
 ///
 /// With [`Digits::Significant`] the digits come from one product of two correctly rounded factors:
 /// the last of 12 is rounded to within 0.501 of a unit, that of 15 to within 0.8.
-#[inline]
 pub fn write(out: &mut Vec<u8>, value: f64, digits: Digits) {
     let mut text = [0; ROOM];
     let length = put(&mut text, value, digits);
@@ -52,8 +51,7 @@ pub fn write(out: &mut Vec<u8>, value: f64, digits: Digits) {
 
 /// Writes a finite number to the start of `text` and returns its length; the bytes after it are
 /// arbitrary.
-#[inline]
-pub fn put(text: &mut [u8; ROOM], value: f64, digits: Digits) -> usize {
+pub(crate) fn put(text: &mut [u8; ROOM], value: f64, digits: Digits) -> usize {
     match digits {
         Digits::Significant(count) => Decimal::of(value, count).put(text),
         Digits::Shortest => put_text(text, zmij::Buffer::new().format(value)),
@@ -70,7 +68,7 @@ fn put_text(text: &mut [u8; ROOM], number: &str) -> usize {
 /// It is faster to decompose several first and convert them afterwards: the steps for one number
 /// depend on each other, those for several do not.
 #[derive(Debug, Clone, Copy)]
-pub struct Decimal {
+pub(crate) struct Decimal {
     value: f64,
     /// Sixteen ASCII digits, the first in the lowest byte, zeros after the last significant one.
     digits: u128,
@@ -86,7 +84,7 @@ impl Decimal {
     /// Decomposes a finite number, to this many significant digits (1 to 15).
     #[inline(always)]
     #[must_use]
-    pub fn of(value: f64, count: u32) -> Self {
+    pub(crate) fn of(value: f64, count: u32) -> Self {
         let (mantissa, exponent) = decompose(value.abs(), count).unwrap_or((0, RARE));
         Self {
             value,
@@ -98,7 +96,7 @@ impl Decimal {
 
     /// Writes it to the start of `text` and returns its length.
     #[inline(always)]
-    pub fn put(&self, text: &mut [u8; ROOM]) -> usize {
+    pub(crate) fn put(&self, text: &mut [u8; ROOM]) -> usize {
         if (SMALLEST_PLAIN..LARGEST_PLAIN).contains(&self.exponent) {
             // The sign is overwritten if there is none.
             text[0] = b'-';
@@ -204,7 +202,7 @@ static FOUR_DIGITS: [u32; 10_000] = {
 /// # Panics
 /// If the text is shorter.
 #[inline(always)]
-pub(super) fn chunk_at<const N: usize>(text: &mut [u8], at: usize) -> &mut [u8; N] {
+pub(crate) fn chunk_at<const N: usize>(text: &mut [u8], at: usize) -> &mut [u8; N] {
     text[at..].first_chunk_mut().expect("room for a piece")
 }
 
@@ -262,6 +260,11 @@ fn rare(value: f64, count: u32) -> String {
 }
 
 /// Text of a finite number with this many significant digits.
+///
+/// ```
+/// use torqcomp_decimal::digits::text;
+/// assert_eq!((text(2.0 / 3.0, 4), text(1.5e-7, 12)), ("0.6667".to_owned(), "1.5e-7".to_owned()));
+/// ```
 #[must_use]
 pub fn text(value: f64, significant: u32) -> String {
     let mut out = Vec::new();

@@ -23,14 +23,20 @@ const EXACT_MANTISSA: u64 = 1 << 53;
 ///
 /// `None` if no finite number begins there, or one that instruments use for a missing value. Anything may follow the
 /// number.
-#[inline(always)]
+///
+/// ```
+/// use torqcomp_decimal::number::read;
+/// assert_eq!(read(b"0.5;-1,25e2;x", 4, b','), Some((-125.0, 11)));
+/// assert_eq!(read(b"0.5;x", 4, b'.'), None);
+/// ```
+#[must_use]
 pub fn read(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
     read_as::<true>(text, at, decimal)
 }
 
 /// The same to within one unit in the last place: it multiplies where [`read`] needs a division.
 /// For time stamps, which are compared with a tolerance and copied as text.
-#[inline(always)]
+#[must_use]
 pub fn read_nearly(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> {
     read_as::<false>(text, at, decimal)
 }
@@ -38,6 +44,7 @@ pub fn read_nearly(text: &[u8], at: usize, decimal: u8) -> Option<(f64, usize)> 
 /// Parses a number at `text[at..]` as its difference from an integer, rounded once: for 1710250000.123456 and
 /// 1710250000 it is 0.123456, where the number itself has a resolution of 2.4e-7 as an `f64`. Also returns the position
 /// after it.
+#[must_use]
 pub fn read_after(text: &[u8], at: usize, decimal: u8, origin: i64) -> Option<(f64, usize)> {
     let (parts, count, place) = parts(text, at, decimal)?;
     let exact = || {
@@ -301,6 +308,7 @@ pub fn is_instruments_mark(value: f64) -> bool {
 }
 
 /// Parses a whole cell, with optional spaces around it.
+#[must_use]
 pub fn cell(text: &str, decimal: u8) -> Option<f64> {
     let text = text.trim().as_bytes();
     read(text, 0, decimal)

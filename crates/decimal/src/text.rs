@@ -1,20 +1,34 @@
 //! Text assembled from many short pieces.
 
+use crate::Span;
 use crate::digits::{self, Decimal, Digits};
 
 /// Longest piece copied with a fixed length.
 const SHORT: usize = 32;
 /// Free space kept at the end.
 const ROOM: usize = digits::ROOM;
+/// Numbers decomposed before they are written: the steps for one depend on each other, those for several do not.
+const TOGETHER: usize = 8;
 
 /// The copy for a short piece, unless the source ends before.
 #[inline(always)]
-fn short_piece(source: &[u8], offset: usize) -> Option<&[u8; SHORT]> {
-    source.get(offset..)?.first_chunk()
+fn short_piece(source: &[u8], span: Span) -> Option<&[u8; SHORT]> {
+    source.get(span.offset()..)?.first_chunk()
 }
 
 /// A growing text. Pieces are copied with a fixed length, which is faster than the exact one; the
 /// surplus is overwritten by the next piece.
+///
+/// ```
+/// use torqcomp_decimal::{Digits, Span, Text};
+/// let mut text = Text::default();
+/// let source = b"0.00 0.01";
+/// text.rows((source, &[Span::new(0, 4), Span::new(5, 4)]), (&[1.0, -0.25], 2.0), 12);
+/// text.seconds(1_500_000_000);
+/// text.byte(b',');
+/// text.number(2.0 / 3.0, Digits::Significant(3));
+/// assert_eq!(text.as_bytes(), b"0.00,2\n0.01,-0.5\n1.500000000,0.667");
+/// ```
 #[derive(Debug, Default)]
 pub struct Text {
     bytes: Vec<u8>,
@@ -34,14 +48,12 @@ impl Text {
     }
 
     /// Appends a byte.
-    #[inline]
     pub fn byte(&mut self, byte: u8) {
         self.room()[0] = byte;
         self.length += 1;
     }
 
     /// Appends a finite number.
-    #[inline]
     pub fn number(&mut self, value: f64, digits: Digits) {
         self.length += digits::put(self.room(), value, digits);
     }
@@ -75,23 +87,51 @@ impl Text {
         }
         let length = SHORT - first;
         text.copy_within(first.., 0);
-        self.copy(&text, 0, length);
+        self.copy(&text, Span::new(0, length));
     }
 
-    /// Appends a decomposed number.
-    #[inline(always)]
-    pub fn decimal(&mut self, decimal: &Decimal) {
-        self.length += decimal.put(self.room());
-    }
-
-    /// Appends `source[offset..offset + length]`, a comma, a number and a line feed.
+    /// Appends a row for each value: the text of `source` there, a comma, the value times `scale`, and a line feed.
     ///
     /// # Panics
-    /// If the source is shorter.
+    /// If a piece is outside the source, or there are fewer than values.
+    pub fn rows(
+        &mut self,
+        (source, spans): (&[u8], &[Span]),
+        (values, scale): (&[f64], f64),
+        count: u32,
+    ) {
+        if count == digits::DEFAULT_COUNT {
+            // The same code, with the number of digits known at compile time.
+            self.rows_of((source, spans), (values, scale), digits::DEFAULT_COUNT);
+        } else {
+            self.rows_of((source, spans), (values, scale), count);
+        }
+    }
+
     #[inline(always)]
-    pub fn row(&mut self, source: &[u8], offset: usize, length: usize, decimal: &Decimal) {
-        let Some(piece) = short_piece(source, offset).filter(|_| length < SHORT) else {
-            self.long_row(source, offset, length, decimal);
+    fn rows_of(
+        &mut self,
+        (source, spans): (&[u8], &[Span]),
+        (values, scale): (&[f64], f64),
+        count: u32,
+    ) {
+        let spans = spans[..values.len()].chunks(TOGETHER);
+        for (values, spans) in values.chunks(TOGETHER).zip(spans) {
+            let mut decimals = [Decimal::of(0.0, count); TOGETHER];
+            for (decimal, value) in decimals.iter_mut().zip(values) {
+                *decimal = Decimal::of(value * scale, count);
+            }
+            for (decimal, span) in decimals.iter().zip(spans) {
+                self.row(source, *span, decimal);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn row(&mut self, source: &[u8], span: Span, decimal: &Decimal) {
+        let length = span.length();
+        let Some(piece) = short_piece(source, span).filter(|_| length < SHORT) else {
+            self.long_row(source, span, decimal);
             return;
         };
         if self.bytes.len() < self.length + SHORT + ROOM {
@@ -107,20 +147,20 @@ impl Text {
     }
 
     #[cold]
-    fn long_row(&mut self, source: &[u8], offset: usize, length: usize, decimal: &Decimal) {
-        self.copy(source, offset, length);
+    fn long_row(&mut self, source: &[u8], span: Span, decimal: &Decimal) {
+        self.copy(source, span);
         self.byte(b',');
-        self.decimal(decimal);
+        self.length += decimal.put(self.room());
         self.byte(b'\n');
     }
 
-    /// Appends `source[offset..offset + length]`.
+    /// Appends a piece of a text.
     ///
     /// # Panics
-    /// If the source is shorter.
-    #[inline]
-    pub fn copy(&mut self, source: &[u8], offset: usize, length: usize) {
-        match short_piece(source, offset) {
+    /// If the text is shorter.
+    pub fn copy(&mut self, source: &[u8], span: Span) {
+        let (offset, length) = (span.offset(), span.length());
+        match short_piece(source, span) {
             Some(piece) if length <= SHORT => *digits::chunk_at(self.room(), 0) = *piece,
             _ => self.copy_long(&source[offset..offset + length]),
         }
@@ -180,7 +220,7 @@ mod tests {
                 text.clear();
                 plain.clear();
                 for (offset, length, byte, value) in &pieces {
-                    text.copy(&source, *offset, *length);
+                    text.copy(&source, Span::new(*offset, *length));
                     plain.extend_from_slice(&source[*offset..offset + length]);
                     text.byte(*byte);
                     plain.push(*byte);
