@@ -85,3 +85,38 @@ pub(crate) fn inside_brackets(heading: &str) -> Option<(&str, &str)> {
             None
         })
 }
+
+/// A power of ten next to a multiplication or division sign in a heading, as written there.
+pub(crate) fn scale_in(heading: &str) -> Option<String> {
+    let is_mark = |c: char| matches!(c, 'x' | 'X' | '×' | '·' | '*' | '/');
+    let is_power = |number: &str| {
+        let exponent = match number.strip_prefix("10^") {
+            Some(exponent) => exponent.parse().unwrap_or(f64::NAN),
+            None => number.parse().map_or(f64::NAN, f64::log10),
+        };
+        exponent != 0.0 && (exponent - exponent.round()).abs() < 1e-9
+    };
+    let words: Vec<&str> = heading
+        .split(|c: char| c.is_whitespace() || "()[]{},;_".contains(c))
+        .filter(|word| !word.is_empty())
+        .collect();
+    let is_alone = |word: &&str| word.chars().count() == 1 && word.chars().all(is_mark);
+    let is_scale = |word: &&&str| {
+        let mut marks = word.char_indices().filter(|(_, c)| is_mark(*c));
+        let is_beside = marks.any(|(at, mark)| {
+            let (left, right) = (&word[..at], &word[at + mark.len_utf8()..]);
+            // In `Torque*100` the sign is between words; in `box10` or the topic `motor/10` it is part of one.
+            let is_between = !matches!(mark, 'x' | 'X' | '/');
+            (is_power(right) && (is_between || left.is_empty()))
+                || (is_power(left) && (is_between || right.is_empty()))
+        });
+        is_beside || (word.contains(['e', 'E', '^']) && is_power(word))
+    };
+    let pairs = words.windows(2).find(|pair| {
+        (is_alone(&pair[0]) && is_power(pair[1])) || (is_power(pair[0]) && is_alone(&pair[1]))
+    });
+    let single = words.iter().find(is_scale);
+    pairs
+        .map(|pair| pair.join(" "))
+        .or_else(|| single.map(|word| (*word).to_owned()))
+}

@@ -129,3 +129,41 @@ fn a_given_rate_does_not_hide_a_gap() {
         assert!(!ran.stderr.contains("rate-joins-gaps"), "{}", ran.stderr);
     }
 }
+
+/// The factors had been ignored, or taken the other way: frequencies 1000 times too low.
+#[test]
+fn a_factor_beside_the_time_that_could_be_either_is_asked_for() {
+    let folder = Folder::new();
+    let stamp = |i: usize| format!("{:.1}", 0.5 * i as f64);
+    for heading in [
+        "Time x1000 [s]",
+        "Time*1000 (s)",
+        "1000 x time [s]",
+        "Time [s] x 1000",
+    ] {
+        folder.write(
+            "in.csv",
+            record(stamp, 0..2000).replace("Time [s]", heading),
+        );
+        compensate(&folder, &[]).says(1, &[heading, "scale factor", "--time-unit ms"]);
+        compensate(&folder, &["--time-unit", "ms"]).says(0, &["2000 samples at 2000 Hz"]);
+    }
+    folder.write(
+        "in.csv",
+        record(stamp, 0..2000).replace("Time [s]", "Zeit in 1/1000 s"),
+    );
+    compensate(&folder, &[]).says(0, &["2000 samples at 2000 Hz"]);
+}
+
+/// It may be the frequency of the signal.
+#[test]
+fn a_mere_frequency_above_a_table_is_an_assumption() {
+    let folder = Folder::new();
+    let rows: String = (0..2000).map(|i| format!("{:.9}\n", volts(i))).collect();
+    for (key, is_assumed) in [("Frequency", true), ("Sampling frequency", false)] {
+        folder.write("in.csv", format!("{key}: 2000 Hz\nbridge [V]\n{rows}"));
+        let report = folder.json(&["inspect", "in.csv", "--json"]);
+        let is_said = crate::util::codes(&report).contains(&"time-assumed");
+        assert_eq!(is_said, is_assumed, "{report}");
+    }
+}

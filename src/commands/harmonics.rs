@@ -319,18 +319,19 @@ fn of_orders(
     let load = speed::load_changes(record, hz, orders);
     // A load step leaves slow components that bias the speed slightly.
     let multiple = multiple::warning(record, hz, orders);
-    let off = (is_given && multiple.is_none())
-        .then(|| speed::off(record, hz, orders, load.is_some()))
-        .flatten();
     let changing = match &multiple {
         Some(_) => None,
         None => speed::warning(record, hz, orders),
     };
-    let is_steady = |others: [&Option<Warning>; 3]| others.iter().all(|found| found.is_none());
-    let sways = is_steady([&multiple, &off, &changing])
+    let is_steady = |others: &[&Option<Warning>]| others.iter().all(|found| found.is_none());
+    let sways = is_steady(&[&multiple, &changing])
         .then(|| speed::sways(record, hz, orders))
         .flatten();
-    let level = is_steady([&off, &changing, &sways])
+    // A speed that sways has no better mean.
+    let off = (is_given && is_steady(&[&multiple, &sways]))
+        .then(|| speed::off(record, hz, orders, load.is_some()))
+        .flatten();
+    let level = is_steady(&[&off, &changing, &sways])
         .then(|| level::warning(record, hz, orders))
         .flatten();
     let is_compensated = way.stand.is_none();

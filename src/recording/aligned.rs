@@ -92,6 +92,42 @@ impl AlignedChannels {
         Self::of(recording, choices, reading).map_err(|failure| failure.at(&source))
     }
 
+    /// Converts the channels to the units of the same channels of another record.
+    ///
+    /// # Errors
+    /// If only one of two has a unit, or that of the other is no multiple of it.
+    pub(crate) fn convert_to_units_of(&mut self, other: &Self) -> Result<(), Failure> {
+        for (channel, other_channel) in self.channels.iter_mut().zip(&other.channels) {
+            let units = [&channel.unit, &other_channel.unit];
+            let factor = match units.map(|unit| unit.as_ref().map(|unit| unit.unit)) {
+                [None, None] => continue,
+                [Some(unit), Some(other)] if unit.dimension() == other.dimension() => {
+                    unit.factor() / other.factor()
+                }
+                _ => {
+                    let [unit, other_unit] =
+                        units.map(|unit| unit.as_ref().map_or("no unit", |u| &u.text));
+                    return Err(Failure::failed(
+                        ErrorCode::RecordsDiffer,
+                        format_args!(
+                            "the channel \"{}\" has {unit} in {} and {other_unit} in {}; give its unit with \
+                             --applied-unit or --measured-unit, or take the records one by one",
+                            channel.name, self.source, other.source
+                        ),
+                    ));
+                }
+            };
+            if factor != 1.0 {
+                channel
+                    .samples
+                    .iter_mut()
+                    .for_each(|value| *value *= factor);
+            }
+            channel.unit.clone_from(&other_channel.unit);
+        }
+        Ok(())
+    }
+
     /// The selected channels. Messages are interpolated where their stamps are not uniform or differ; so are the
     /// samples of a text with `--resample`.
     ///

@@ -261,6 +261,83 @@ fn responses_of_nonsense_are_refused() {
     run(&["odd.csv"], "force", "beam").says(1, &["not uniform", "--rate"]);
 }
 
+/// The units of later records had been ignored: a gain 99 times too large, or 11 % too small, without a word.
+#[test]
+fn responses_in_other_units_are_converted() {
+    let folder = Folder::new();
+    let mut noise = Noise(43);
+    let records: Vec<[Vec<f64>; 2]> = (0..2)
+        .map(|_| {
+            let x: Vec<f64> = (0..8000).map(|_| noise.normal()).collect();
+            let y = ringing_filter(&x);
+            [x, y]
+        })
+        .collect();
+    let times = |values: &[f64], factor: f64| values.iter().map(|v| v * factor).collect();
+    let write = |name: &str, [x, y]: &[Vec<f64>; 2], heads: [&str; 2], factors: [f64; 2]| {
+        let columns = [
+            (heads[0], times(x, factors[0])),
+            (heads[1], times(y, factors[1])),
+        ];
+        table(&folder, name, &columns);
+    };
+    write(
+        "a.csv",
+        &records[0],
+        ["torque [N m]", "beam [V]"],
+        [1.0, 1.0],
+    );
+    write(
+        "b.csv",
+        &records[1],
+        ["torque [N m]", "beam [V]"],
+        [1.0, 1.0],
+    );
+    write(
+        "other.csv",
+        &records[1],
+        ["torque [cN m]", "beam [mV]"],
+        [100.0, 1000.0],
+    );
+    write("none.csv", &records[1], ["torque", "beam [V]"], [1.0, 1.0]);
+    write(
+        "force.csv",
+        &records[1],
+        ["torque [N]", "beam [V]"],
+        [1.0, 1.0],
+    );
+    let args = |second| {
+        let files = ["identify", "response", "a.csv", second, "--json"];
+        let channels = [
+            "--applied",
+            "torque",
+            "--measured",
+            "beam",
+            "--band",
+            "10..300",
+        ];
+        [&files[..], &channels].concat()
+    };
+    let [one_unit, two_units] = ["b.csv", "other.csv"].map(|second| folder.json(&args(second)));
+    for entry in one_unit["parameters"].as_array().unwrap() {
+        let name = entry["name"].as_str().unwrap();
+        let [(value, _, unit), (converted, _, its_unit)] =
+            [&one_unit, &two_units].map(|report| parameter(report, name));
+        assert_eq!(unit, its_unit);
+        assert_close(converted, value, 1e-6);
+    }
+    let none = [
+        "\"torque\"",
+        "no unit in none.csv",
+        "N m in a.csv",
+        "--applied-unit",
+    ];
+    folder.run(&args("none.csv")).says(1, &none);
+    folder
+        .run(&args("force.csv"))
+        .says(1, &["\"torque\" has N in force.csv"]);
+}
+
 #[test]
 fn loads_and_runs_of_nonsense_are_refused() {
     let folder = Folder::new();

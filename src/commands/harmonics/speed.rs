@@ -1,5 +1,7 @@
 //! Checks that the speed is constant and as given; otherwise a fit of fixed frequencies is wrong.
 
+use std::f64::consts::{PI, TAU};
+
 use torqcomp_dsp::harmonics::{Component, Fundamental, Harmonics, fit, refine_fundamental};
 use torqcomp_dsp::store::SampleStore;
 
@@ -170,8 +172,11 @@ fn speed_in(
     Some((found, is_of_orders))
 }
 
-/// Maximum and minimum number of windows for the angle of the shaft.
-const MOST_WINDOWS: usize = 128;
+/// Periods of the lowest order in a window for the angle of the shaft: short windows show fast fluctuations, long ones weak
+/// components.
+const PERIODS: [f64; 2] = [2.0, FEWEST];
+/// Maximum and minimum number of windows.
+const MOST_WINDOWS: usize = 1024;
 const FEWEST_WINDOWS: usize = 8;
 /// Variance of the angle over that due to noise, from which the speed fluctuates.
 const SWAYS: f64 = 4.0;
@@ -188,16 +193,22 @@ pub(super) fn sways(
 ) -> Option<Warning> {
     let rate_hz = record.rate_hz;
     let count = record.samples.count().min(FIRST);
-    let lowest = orders.iter().copied().fold(1.0, f64::min);
-    let shortest = (FEWEST * rate_hz / (lowest * fundamental_hz)).ceil() as usize;
-    let windows = (count / shortest).min(MOST_WINDOWS);
-    if windows < FEWEST_WINDOWS {
-        return None;
-    }
     let samples = record.samples.part(0..count).ok()?;
     let fundamental = Fundamental::given(fundamental_hz);
     let whole = fit(&samples[..], rate_hz, 0.0, fundamental, orders).ok()?;
-    let shown = angles_by_order(&samples, rate_hz, fundamental, &whole, windows)?;
+    let lowest = orders.iter().copied().fold(1.0, f64::min);
+    PERIODS.into_iter().find_map(|periods| {
+        let shortest = (periods * rate_hz / (lowest * fundamental_hz)).ceil() as usize;
+        let windows = (count / shortest).min(MOST_WINDOWS);
+        let is_enough = windows >= FEWEST_WINDOWS;
+        let shown =
+            is_enough.then(|| angles_by_order(&samples, rate_hz, fundamental, &whole, windows));
+        sways_by(orders, &shown??)
+    })
+}
+
+/// The same, from the angles by each of the orders in each window.
+fn sways_by(orders: &[f64], shown: &[Vec<Option<[f64; 2]>>]) -> Option<Warning> {
     let mean_angle = |angles: &Vec<Option<[f64; 2]>>| {
         let sure = angles.iter().flatten();
         let sums = sure.fold([0.0; 2], |[sum, weights], [angle, variance]| {
@@ -219,8 +230,10 @@ pub(super) fn sways(
         return None;
     }
     let sways_rad = (variance - noise).max(0.0).sqrt();
-    let there = whole.components.iter().filter(|c| is_sure(c));
-    let highest = there.map(|c| c.order).fold(0.0, f64::max);
+    // In the windows: smeared over the whole record, none may be significant.
+    let is_there = |k: &usize| shown.iter().any(|angles| angles[*k].is_some());
+    let there = (0..orders.len()).filter(is_there).map(|k| orders[k]);
+    let highest = there.fold(0.0, f64::max);
     (variance > SWAYS * noise && highest * sways_rad > SWAY_RAD).then(|| {
         let loss = -(-0.5 * (highest * sways_rad).powi(2)).exp_m1();
         Warning::new(
@@ -262,19 +275,33 @@ fn angles_by_order(
 ) -> Option<Vec<Vec<Option<[f64; 2]>>>> {
     let orders: Vec<f64> = whole.components.iter().map(|c| c.order).collect();
     let length = samples.len() / windows;
+    // A phase continues from the window before: it may move by turns.
+    let mut phases_rad = vec![0.0; orders.len()];
     let shown = (0..windows).map(|window| {
         let start = window * length;
         let part = &samples[start..start + length];
-        let here = fit(part, rate_hz, start as f64 / rate_hz, fundamental, &orders).ok()?;
+        let time_s = start as f64 / rate_hz;
+        let here = fit(part, rate_hz, time_s, fundamental, &orders).ok()?;
         let pairs = whole.components.iter().zip(&here.components);
-        let by_order = pairs.map(|(mean, here)| {
+        let by_order = pairs.zip(&mut phases_rad).map(|((mean, here), phase_rad)| {
             let turned = (here.phasor * mean.phasor.conj()).arg();
             let std_rad = here.std_amplitude / here.phasor.norm();
-            is_sure(here).then(|| [turned / here.order, (std_rad / here.order).powi(2)])
+            is_sure(here).then(|| {
+                *phase_rad += (turned - *phase_rad + PI).rem_euclid(TAU) - PI;
+                [*phase_rad / here.order, (std_rad / here.order).powi(2)]
+            })
         });
         Some(by_order.collect())
     });
-    shown.collect()
+    let mut shown: Vec<Vec<Option<[f64; 2]>>> = shown.collect::<Option<_>>()?;
+    for k in 0..orders.len() {
+        let own = shown.iter().filter_map(|angles| angles[k]);
+        let (sum, count) = own.fold((0.0, 0.0), |(sum, n), [angle, _]| (sum + angle, n + 1.0));
+        for [angle, _] in shown.iter_mut().filter_map(|angles| angles[k].as_mut()) {
+            *angle -= sum / count;
+        }
+    }
+    Some(shown)
 }
 
 /// Mean of the variances of values.

@@ -25,7 +25,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         [args.applied_unit.as_deref(), args.measured_unit.as_deref()],
     );
     let mut recorded = Recorded::default();
-    let mut loaded = Vec::new();
+    let mut loaded: Vec<AlignedChannels> = Vec::new();
     for input in &args.inputs {
         let mut read = AlignedChannels::read(&Input::of(input), &choices, &args.reading)?;
         read.channels[1].must_be_as_recorded(&read.source)?;
@@ -38,6 +38,9 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         recorded.warn(quality::clipped(&read), false);
         if let Some(radius) = &args.radius {
             to_torque(&mut read.channels[0], radius)?;
+        }
+        if let Some(first) = loaded.first() {
+            read.convert_to_units_of(first)?;
         }
         loaded.push(read);
     }

@@ -6,6 +6,7 @@ mod force;
 mod foreign;
 mod inverse;
 mod kind;
+mod late;
 mod line_noise;
 mod lines;
 mod modal;
@@ -92,9 +93,29 @@ impl ResponseOptions {
 /// # Errors
 /// If the records show no response.
 pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identification, Failure> {
-    let mut result = Identification::new("response");
-    let set = blocks::blocks(records, options, &mut result)?;
-    let (set, lines) = lines::in_band(set, options)?;
+    let cut = |records: &[Driven]| {
+        let mut result = Identification::new("response");
+        let set = blocks::blocks(records, options, &mut result)?;
+        Ok((result, lines::in_band(set, options)?))
+    };
+    let (result, (set, lines)) = cut(records)?;
+    let lag = late::lag(&set, &lines);
+    let as_recorded = evaluate(records, options, (set, lines), result);
+    if lag == 0 {
+        return as_recorded;
+    }
+    let aligned = late::aligned(records, lag);
+    let found = cut(&aligned).and_then(|(result, of)| evaluate(&aligned, options, of, result));
+    late::better(as_recorded, found, lag as f64 / records[0].rate_hz)
+}
+
+/// Evaluates the blocks and lines of records.
+fn evaluate(
+    records: &[Driven],
+    options: &ResponseOptions,
+    (set, lines): (Set, Lines),
+    mut result: Identification,
+) -> Result<Identification, Failure> {
     let leads = check::leads(&set, &lines, options.order);
     let data = lines::data(&set.powers, &set, &lines, options);
     // The transforms of whole records take about as long as the search for the number of modes.

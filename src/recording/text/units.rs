@@ -163,11 +163,12 @@ fn ratio(text: &str) -> Option<(&str, NamedUnit)> {
     (is_ratio && !name.is_empty()).then(|| (name.trim(), unit))
 }
 
-/// Whether a unit can follow a text: not after a number (`lowpass 100 Hz`) nor a word that requires more
+/// Whether a unit can follow a text: not after a number (`lowpass 100 Hz`, `M/10^-3 Nm`) nor a word that requires more
 /// (`mV per Nm`).
 fn can_end_before_unit(name: &str) -> bool {
-    let last = name.rsplit(' ').next().unwrap_or_default();
-    let is_number = last.starts_with(|c: char| c.is_ascii_digit());
+    let last = name.rsplit([' ', '/']).next().unwrap_or_default();
+    let number = last.trim_start_matches(['x', '×', '*']);
+    let is_number = number.starts_with(|c: char| c.is_ascii_digit());
     let is_open = !last.ends_with(char::is_alphanumeric);
     !is_number && !is_open && !["per", "pro", "at", "bei", "par"].contains(&last)
 }
@@ -246,7 +247,8 @@ fn bracket(text: &str) -> Option<(String, &str)> {
     None
 }
 
-/// Seconds per unit of time with a factor in a heading: 0.01 for `Zeit [1/100 s]`, `Zeit x10ms` and `Time (s) x1e-2`.
+/// Seconds per unit of time with a factor in a heading: 0.01 for `Zeit [1/100 s]`, `Zeit in 1/100 s`, `Zeit x10ms` and
+/// `Time (s) x1e-2`. Not for `Time [s] x 1000`, whose numbers may be milliseconds as well.
 #[must_use]
 pub fn scaled_time(heading: &str) -> Option<f64> {
     let mut parts = heading.split(['[', '(', ']', ')']).skip(1);
@@ -255,8 +257,14 @@ pub fn scaled_time(heading: &str) -> Option<f64> {
         let mut words = heading.split_whitespace();
         words.find(|word| word.starts_with(['x', '×']) && word.len() > 1)
     };
+    let named = || {
+        let mut marks = [" in ", " en ", " em ", "/"].into_iter();
+        marks
+            .find_map(|mark| heading.split_once(mark))
+            .map(|(_, unit)| unit)
+    };
     let unit_of = |text: &str| read(text).filter(is_time).map(|unit| unit.unit.factor());
-    if let Some((factor, unit)) = inside.or_else(word).and_then(factor) {
+    if let Some((factor, unit)) = inside.or_else(word).or_else(named).and_then(factor) {
         return Some(factor * unit_of(unit)?);
     }
     let behind = behind?.trim();
@@ -264,7 +272,7 @@ pub fn scaled_time(heading: &str) -> Option<f64> {
         return None;
     }
     let (factor, rest) = factor(behind)?;
-    (rest.is_empty()).then_some(factor * unit_of(inside?)?)
+    (rest.is_empty() && factor < 1.0).then_some(factor * unit_of(inside?)?)
 }
 
 /// The factor at the start of a text, and the rest: `1/100 s`, `x10ms`, `1e-3 s`, `10^-3 s`.
@@ -309,6 +317,8 @@ mod tests {
             ("Time (1/20000 s)", 5e-5),
             ("Time (0.1 ms)", 1e-4),
             ("Time (s) x1e-3", 1e-3),
+            ("Zeit in 1/1000 s", 1e-3),
+            ("t/10^-3 s", 1e-3),
         ] {
             let found = scaled_time(heading).unwrap_or_else(|| panic!("{heading}"));
             assert!((found / seconds - 1.0).abs() < 1e-12, "{heading}: {found}");
@@ -320,6 +330,9 @@ mod tests {
             "t (run 2)",
             "Time (s) x",
             "Zeit [s] 2",
+            "Time (s) x 1000",
+            "Time in s",
+            "t / s",
         ] {
             assert_eq!(scaled_time(heading), None, "{heading}");
         }
@@ -352,6 +365,8 @@ mod tests {
             ("Torque Nm", "Torque", Some("Nm"), true),
             ("Force N", "Force N", None, false),
             ("Lowpass 100 Hz", "Lowpass 100 Hz", None, false),
+            ("M/10^-3 Nm", "M/10^-3 Nm", None, false),
+            ("M/x0.1 Nm", "M/x0.1 Nm", None, false),
             ("Gain mV per Nm", "Gain mV per Nm", None, false),
             ("Температура, С", "Температура, С", None, false),
             ("Voltage in", "Voltage in", None, false),

@@ -195,6 +195,12 @@ impl Sources<'_> {
         let stamps = self.stamp_rule(group, header.as_ref().map(|(_, hz)| *hz))?;
         let stamps = stamps.or_else(|| self.rule_of_steps());
         let of_stamps = stamps.as_ref().and_then(|rule| rule.assumed.as_deref());
+        let vague = header
+            .as_ref()
+            .filter(|(words, _)| stamps.is_none() && keys::is_vague(words));
+        let of_header = vague.map(|(words, _)| {
+            format!("\"{words}\" above the table was taken for the sampling rate, but may be about the signal")
+        });
         // A textual date and time is better than a tick count.
         let is_count = |text: &String| text.bytes().all(|byte| byte.is_ascii_digit());
         let mut start_text = stamps.as_ref().and_then(|rule| rule.start_text.clone());
@@ -204,7 +210,7 @@ impl Sources<'_> {
         Ok(AxisRule {
             assumed: match (assumed.filter(|_| stamps.is_some()), of_stamps) {
                 (Some(a), Some(b)) => Some(format!("{a}; {b}")),
-                (a, b) => a.or(b).map(str::to_owned),
+                (a, b) => a.or(b).map(str::to_owned).or(of_header),
             },
             header_start_s: self.header_start(),
             given_hz: self.reading.rate_hz,

@@ -7,7 +7,7 @@ use crate::recording::text::clock::{Clock, unwrap_midnights};
 use crate::recording::text::rows::{Column, ColumnKind};
 use crate::recording::text::units;
 use crate::recording::{seconds_assumed, typical_step};
-use crate::unit::NamedUnit;
+use crate::unit::{NamedUnit, scale_in};
 use torqcomp_model::Unit;
 
 /// Derivation of stamps from the columns of a table.
@@ -309,6 +309,16 @@ impl Sources<'_> {
         }
         if let Some(seconds) = units::scaled_time(&field.heading) {
             return Ok(Some((seconds, None)));
+        }
+        if let Some(scale) = scale_in(&field.heading) {
+            return Err(Failure::failed(
+                ErrorCode::UnitUnclear,
+                format_args!(
+                    "the heading \"{}\" contains a scale factor, \"{scale}\", that may divide or multiply the time; \
+                     give the unit of its numbers, for example --time-unit ms",
+                    field.heading
+                ),
+            ));
         }
         if let Some(unit) = field.unit.as_ref().filter(|unit| units::is_time(unit)) {
             return Ok(Some((unit.unit.factor(), None)));

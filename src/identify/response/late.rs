@@ -1,0 +1,132 @@
+//! A channel that lags the other by so much that no fit of a delay can start from zero: from a quarter of a period of the
+//! strongest line on, as with two recorders.
+
+use std::f64::consts::PI;
+
+use num_complex::Complex64;
+use torqcomp_dsp::frf::Estimator;
+
+use super::blocks::Set;
+use super::lines::Lines;
+use super::{Driven, shift};
+use crate::failure::Failure;
+use crate::identify::{Identification, NamedEstimate};
+
+/// Part of the largest envelope of the impulse response at which it begins.
+const BEGINS: f64 = 0.5;
+/// Lag in periods of the strongest line from which the channels are aligned first.
+const PERIODS: f64 = 0.25;
+/// Residual of the aligned records over that of the records as they are, up to which the channels are late: more than
+/// one, as the lag may stand in for nothing else with as few modes.
+const AS_GOOD: f64 = 1.02;
+
+/// Samples by which the measured channel lags, negative if it leads; 0 for less than a fit of a delay finds.
+///
+/// The impulse response `h(τ) = Σ H(f) e^{j2πfτ}` of the band begins there. Its envelope is that of the analytic signal,
+/// from the same sum with `−jH`.
+pub(super) fn lag(set: &Set, lines: &Lines) -> isize {
+    let frf = set.powers.response(Estimator::H1);
+    let count = 2 * (set.lines - 1);
+    let share = |k: usize| (k - lines.start) as f64 / lines.len() as f64;
+    // Tapered towards the top of the band, so that it does not ring.
+    let weight = |k: usize| frf.coherence[k] * (0.5 * PI * share(k)).cos().powi(2);
+    let inverse = torqcomp_fourier::inverse(count);
+    let transformed = |turn: Complex64| {
+        let mut spectrum = inverse.make_input_vec();
+        for k in lines.clone() {
+            spectrum[k] = turn * weight(k) * frf.response[k];
+        }
+        let mut impulse = inverse.make_output_vec();
+        let done = inverse.process(&mut spectrum, &mut impulse);
+        done.expect("lengths match, and neither end of the spectrum is set");
+        impulse
+    };
+    let [impulse, turned] = [Complex64::ONE, -Complex64::I].map(transformed);
+    let envelope: Vec<f64> = impulse
+        .iter()
+        .zip(&turned)
+        .map(|(a, b)| a.hypot(*b))
+        .collect();
+    let largest = |values: &mut dyn Iterator<Item = (usize, f64)>| {
+        values
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .unwrap_or_default()
+    };
+    let (peak, height) = largest(&mut envelope.iter().copied().enumerate());
+    let is_before = |back: &usize| envelope[(peak + count - back) % count] < BEGINS * height;
+    let back = (0..count).find(is_before).unwrap_or(0);
+    let begins = peak as isize - back as isize;
+    let lag = match begins > (count / 2) as isize {
+        true => begins - count as isize,
+        false => begins,
+    };
+    let (strongest, _) = largest(
+        &mut lines
+            .clone()
+            .map(|k| (k, weight(k) * frf.response[k].norm())),
+    );
+    let period = count as f64 / strongest as f64;
+    if (lag.unsigned_abs() as f64) < PERIODS * period {
+        0
+    } else {
+        lag
+    }
+}
+
+/// The records with the later channel moved forward.
+pub(super) fn aligned<'a>(records: &[Driven<'a>], lag: isize) -> Vec<Driven<'a>> {
+    let late = lag.unsigned_abs();
+    let moved = |record: &Driven<'a>| {
+        let count = record.applied.len().saturating_sub(late);
+        let [applied, measured] = match lag < 0 {
+            true => [late, 0],
+            false => [0, late],
+        };
+        Driven {
+            applied: &record.applied[applied..applied + count],
+            measured: &record.measured[measured..measured + count],
+            ..*record
+        }
+    };
+    records.iter().map(moved).collect()
+}
+
+/// What explains the records better: as they are, or aligned. The lag is added to the delay of the aligned ones.
+pub(super) fn better(
+    as_recorded: Result<Identification, Failure>,
+    aligned: Result<Identification, Failure>,
+    lag_s: f64,
+) -> Result<Identification, Failure> {
+    let Ok(mut aligned) = aligned else {
+        return as_recorded;
+    };
+    let left =
+        |found: &Identification| found.fit.as_ref().map_or(f64::INFINITY, |fit| fit.relative);
+    let is_better = as_recorded.as_ref().map_or(true, |as_recorded| {
+        aligned.modes.len() <= as_recorded.modes.len()
+            && left(&aligned) <= AS_GOOD * left(as_recorded)
+    });
+    if !is_better {
+        return as_recorded;
+    }
+    aligned
+        .warnings
+        .retain(|warning| warning.code != "channels-shifted");
+    let delay = aligned
+        .parameters
+        .iter_mut()
+        .find(|parameter| parameter.name == "delay");
+    let delay_s = match delay {
+        Some(delay) => {
+            *delay = NamedEstimate::new("delay", "s", delay.value() + lag_s, delay.std());
+            delay.value()
+        }
+        None => {
+            let delay = NamedEstimate::new("delay", "s", lag_s, None);
+            aligned.parameters.push(delay);
+            lag_s
+        }
+    };
+    shift::warn(&mut aligned, delay_s);
+    Ok(aligned)
+}
