@@ -2,7 +2,7 @@
 
 use torqcomp::identify::{Identification, NamedEstimate, response};
 
-use super::response::{driven_by, driven_mode};
+use super::response::{driven, driven_by, driven_mode};
 use super::{Coverage, Noise, TAU, of};
 
 const RATE_HZ: f64 = 1000.0;
@@ -111,6 +111,25 @@ fn a_sweep_on_a_late_channel_shows_one_mode_and_the_delay() {
                 assert_eq!(codes(&found), ["channels-shifted"], "{what}");
             }
         }
+    }
+}
+
+/// One to six periods late, as with two recorders: the static gain had had the wrong sign, beside modes that are none.
+#[test]
+fn a_channel_late_by_periods_shows_one_mode_and_the_delay() {
+    for samples in [20, 100] {
+        let mut noise = Noise(61);
+        let (applied, shown) = driven(20_000, (250.0, RATIO), &mut noise);
+        let size = 0.01 * torqcomp_dsp::rms(&shown);
+        let measured = noisy(&late(&shown, samples), LEVEL, size, &mut noise);
+        let found = found(&applied, &measured);
+        assert_eq!(
+            (found.modes.len(), codes(&found)),
+            (1, vec!["channels-shifted"])
+        );
+        is_near(of(&found, "natural_frequency"), NATURAL_HZ, "frequency");
+        is_near(of(&found, "static_gain"), 1.0, "gain");
+        is_near(of(&found, "delay"), samples as f64 / RATE_HZ, "delay");
     }
 }
 

@@ -66,8 +66,10 @@ const STANDING: f64 = 0.3;
 const LONGER: f64 = 1.5;
 /// Smallest extreme of the opposite sign, relative to the largest, that can be a limit.
 const OTHER_SIDE: f64 = 0.1;
-/// Minimum number of such samples.
+/// Minimum number of such samples; one less if none is a little lower, which a round top has: beside three samples within
+/// `w` of its peak, the next are within `4w`.
 const LEAST_STANDING: usize = 4;
+const ROUND: f64 = 6.0;
 /// Number of equal consecutive samples that means clipping.
 const FLAT: usize = 3;
 /// Samples kept before the rise of the force.
@@ -100,7 +102,7 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
     let noises = [noise, noise_of(measured)];
     let lengths = |k: usize| starts.get(k + 1).copied().unwrap_or(force.len()) - starts[k];
     let enough = common_length(&(0..starts.len()).map(lengths).collect::<Vec<_>>());
-    (0..peaks.len())
+    let mut hits: Vec<Hit> = (0..peaks.len())
         .map(|k| {
             let range = starts[k]..starts[k] + lengths(k);
             let is_last = k + 1 == starts.len();
@@ -124,7 +126,29 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
                 second,
             }
         })
-        .collect()
+        .collect();
+    mark_at_limit(&mut hits, &size, noise);
+    hits
+}
+
+/// Marks the hits that reach the limit of another one: they are at it as well.
+fn mark_at_limit(hits: &mut [Hit], size: &dyn Fn(usize) -> f64, noise: f64) {
+    let is_clipped = |hit: &&Hit| hit.faults.contains(&HitFault::ForceClipped);
+    let limits = hits.iter().filter(is_clipped).map(|hit| size(hit.peak));
+    let Some(limit) = limits.reduce(f64::min) else {
+        return;
+    };
+    for hit in hits {
+        let is_at_limit = (size(hit.peak) - limit).abs() <= near(noise, limit) * limit;
+        if is_at_limit && !hit.faults.contains(&HitFault::ForceClipped) {
+            hit.faults.insert(0, HitFault::ForceClipped);
+        }
+    }
+}
+
+/// Relative distance from a limit within which its noise leaves samples that are at it.
+fn near(noise: f64, limit: f64) -> f64 {
+    (NOISE.0 * noise / limit).clamp(LEVEL, NOISE.1)
 }
 
 /// Amplitude of a response in its last twentieth, without noise, relative to its largest.
@@ -247,15 +271,21 @@ fn stands(samples: &[f64], rest: f64, noise: f64) -> bool {
     let mut limits = sides.filter(|(_, extreme)| *extreme > OTHER_SIDE * largest);
     limits.any(|(side, extreme)| {
         let size = |v: &f64| side * (v - rest);
-        let near = (NOISE.0 * noise / extreme).clamp(LEVEL, NOISE.1);
+        let near = near(noise, extreme);
         let usual = (1.0 - near).acos() / std::f64::consts::FRAC_PI_3;
         let least = STANDING.max(LONGER * usual);
         let is_high = |v: &f64| size(v) >= 0.5 * extreme;
         let mut swings = samples.chunk_by(|a, b| is_high(a) == is_high(b));
         swings.any(|swing| {
-            let standing = swing.iter().filter(|v| size(v) >= (1.0 - near) * extreme);
-            let standing = standing.count();
-            standing >= LEAST_STANDING && standing as f64 > least * swing.len() as f64
+            let within = |part: f64| {
+                swing
+                    .iter()
+                    .filter(|v| size(v) >= (1.0 - part) * extreme)
+                    .count()
+            };
+            let standing = within(near);
+            let is_sharp = standing + 1 == LEAST_STANDING && within(ROUND * near) == standing;
+            (standing >= LEAST_STANDING || is_sharp) && standing as f64 > least * swing.len() as f64
         })
     })
 }
@@ -517,5 +547,34 @@ mod tests {
                 "limits {force_limit} and {swing_limit}"
             );
         }
+    }
+
+    /// Strokes of seven samples: three stand at the limit, or fewer where another hit shows it.
+    #[test]
+    fn short_strokes_at_a_noisy_limit_are_named() {
+        let stroke = |at: f64, height: f64, limit: f64, force: &mut [f64]| {
+            for (i, value) in force.iter_mut().enumerate() {
+                let u = (i as f64 - at) / 8.0;
+                if (0.0..1.0).contains(&u) {
+                    *value += (height * (std::f64::consts::PI * u).sin().powi(2)).min(limit);
+                }
+            }
+        };
+        let faults = |limit: f64| {
+            let mut force: Vec<f64> = (0..6000).map(|i| 0.005 * quiet(3 * i)).collect();
+            stroke(500.3, 16.0, limit, &mut force);
+            stroke(2500.1, 10.2, limit, &mut force);
+            stroke(4500.4, 7.0, limit, &mut force);
+            let ring = |i: i32| {
+                let t = f64::from((i + 1500) % 2000);
+                (-0.01 * t).exp() * (0.37 * t).sin()
+            };
+            let measured: Vec<f64> = (0..6000).map(ring).collect();
+            let hits = find_hits(&force, &measured, 1000);
+            hits.into_iter().map(|hit| hit.faults).collect::<Vec<_>>()
+        };
+        let clipped = vec![HitFault::ForceClipped];
+        assert_eq!(faults(f64::INFINITY), [vec![], vec![], vec![]]);
+        assert_eq!(faults(9.0), [clipped.clone(), clipped, vec![]]);
     }
 }
