@@ -163,6 +163,11 @@ fn threads_do_not_change_a_byte() {
 /// Diagnosis of a case whose measured samples are modified as a function of the applied record, the row and the
 /// sample.
 fn changed(case: &Case, change: impl Fn(&[f64], usize, f64) -> f64) -> serde_json::Value {
+    with_change(case, change).json(&diagnose(&["--json"]))
+}
+
+/// Its folder.
+fn with_change(case: &Case, change: impl Fn(&[f64], usize, f64) -> f64) -> Folder {
     let folder = folder(case);
     for (name, record) in [("train.csv", &case.train), ("holdout.csv", &case.holdout)] {
         let text = folder.read(name);
@@ -178,7 +183,7 @@ fn changed(case: &Case, change: impl Fn(&[f64], usize, f64) -> f64) -> serde_jso
         });
         folder.write(name, rows.collect::<String>());
     }
-    folder.json(&diagnose(&["--json"]))
+    folder
 }
 
 /// Checks that a diagnosis names no effect and describes the residual.
@@ -302,6 +307,28 @@ fn a_wrong_sign_is_refused_as_one() {
     }
     let run = folder.run(&diagnose(&[]));
     run.says(1, &["of the opposite sign", "change the sign"]);
+}
+
+/// Beside a line of the stand file every effect is fitted as in a record without a line, from a start of the right size.
+#[test]
+fn effects_are_fitted_beside_a_line() {
+    let case = strong("gage-creep", 0);
+    let amplitude = 20.0 * noise_rms(&case);
+    let folder = with_change(&case, |_, row, y| {
+        y + amplitude * (TAU * 60.0 * row as f64 / 20_000.0).sin()
+    });
+    let declared = format!(
+        "{HERTEL}\n[[effects]]\nkind = \"mains-pickup\"\nform = \"60-Hz\"\nfrequency = \"60 Hz\"\n\
+         amplitude = \"{amplitude} N m\"\n"
+    );
+    folder.write("stand.toml", declared);
+    let report = folder.json(&diagnose(&["--json"]));
+    assert_eq!(report["effects"], serde_json::json!(["gage-creep"]));
+    let candidates = report["candidates"].as_array().expect("a list");
+    for name in ["cubic-stiffness", "quadratic-damping", "end-stop"] {
+        let candidate = candidates.iter().find(|c| c["effect"] == name);
+        assert!(candidate.expect(name)["train_rms"].is_number(), "{name}");
+    }
 }
 
 /// The square of such a sample overflows, and with it every error.

@@ -86,11 +86,6 @@ impl NuisanceTerms {
             ..Self::NONE
         }
     }
-
-    /// Whether it includes disturbances not caused by the applied quantity.
-    pub fn disturb(&self) -> bool {
-        !self.lines_hz.is_empty() || self.spikes_hz.is_some() || self.drift_half_waves > 0
-    }
 }
 
 /// Derivatives of a record, over its range, with respect to its initial state.

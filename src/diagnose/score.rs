@@ -360,7 +360,7 @@ impl BaseModel {
 /// Derivatives of a record's residual with respect to the parameters, without its nuisance terms, and these
 /// terms.
 fn slopes(fitted: &FittedModel, record: &StandRecord) -> (Columns, Nuisance) {
-    let terms = fitted.structure.context.terms();
+    let (_, terms) = fitted.structure.model(&fitted.values);
     let nuisance = fitted.nuisance(record, &terms);
     let derivatives = derivatives(fitted, record, &terms, &nuisance);
     let mut slopes = Columns::default();

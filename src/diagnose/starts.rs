@@ -208,11 +208,13 @@ fn evaluate(
     training: &[StandRecord],
 ) -> Option<Start> {
     let (model, terms) = structure.model(&values);
+    let last = structure.effects.last();
+    let disturbs = last.is_some_and(EffectForm::is_disturbance);
     let (mut left, mut along, mut size) = (0.0, 0.0, 0.0);
     let residuals = base.scored.train();
     let residuals = training.iter().zip(residuals.iter());
     for (k, (record, before)) in residuals.enumerate() {
-        if terms.disturb() {
+        if disturbs {
             let mut residual = before.samples.clone();
             let record = record.clone().with_spikes(&terms, &residual);
             let nuisance = record.nuisance(&base.scored.fitted.free, &terms, None);
@@ -228,7 +230,7 @@ fn evaluate(
         size += dot(&change, &change);
     }
     let factor = if size > 0.0 { along / size } else { 0.0 };
-    let reduction = match terms.disturb() {
+    let reduction = match disturbs {
         true => -left,
         false => along * factor,
     };
