@@ -208,7 +208,7 @@ impl WayBack {
 }
 
 /// Warnings, first about losses, then about the record, its stand and its channel.
-fn of_inputs(way: &WayBack, record: &UniformRecord<Spool>) -> Vec<Warning> {
+fn of_inputs(way: &WayBack, record: &UniformRecord) -> Vec<Warning> {
     let of_stand = way.stand.iter().flat_map(|(stand, _)| &stand.warnings);
     let lost = record.summary.lost.iter();
     let said = lost.chain(&record.summary.warnings).chain(of_stand);
@@ -227,7 +227,7 @@ fn phase_reference(start: Moment, duration_s: f64) -> (Moment, f64) {
 /// The best-fitting fundamental near the given one.
 fn refined(
     args: &cli::Harmonics,
-    record: &UniformRecord<Spool>,
+    record: &UniformRecord,
     orders: &[f64],
 ) -> Result<Fundamental, Failure> {
     let (given_hz, span) = (args.fundamental, 0.01 * args.refine_span);
@@ -250,7 +250,7 @@ fn refined(
 fn fit(
     args: &cli::Harmonics,
     way: &WayBack,
-    record: &UniformRecord<Spool>,
+    record: &UniformRecord,
     source: &str,
     (channel, channel_unit): (&str, Option<&NamedUnit>),
 ) -> Result<HarmonicsReport, Failure> {
@@ -310,7 +310,7 @@ fn fit(
 /// Checks that the speed is constant and as given, and that all orders are in the band of a compensated record.
 fn of_orders(
     way: &WayBack,
-    record: &UniformRecord<Spool>,
+    record: &UniformRecord,
     fundamental: &Fundamental,
     orders: &[f64],
 ) -> Vec<Warning> {
@@ -350,7 +350,7 @@ fn of_orders(
 
 /// Warnings from the samples themselves.
 fn of_quality(
-    record: &UniformRecord<Spool>,
+    record: &UniformRecord,
     seen: &[f64],
     channel: &str,
     chain: &Calibration,

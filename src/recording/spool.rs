@@ -7,7 +7,6 @@ use std::ops::Range;
 use torqcomp_dsp::Error;
 use torqcomp_dsp::store::SampleStore;
 
-use super::uniform::KeepSamples;
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::ShowPath;
 use crate::io::storage::Scratch;
@@ -28,8 +27,12 @@ pub(crate) struct Spool {
     count: usize,
 }
 
-impl KeepSamples for Spool {
-    fn keep(&mut self, samples: &[f64]) -> Result<(), Failure> {
+impl Spool {
+    /// Appends samples.
+    ///
+    /// # Errors
+    /// If there is no room.
+    pub(super) fn keep(&mut self, samples: &[f64]) -> Result<(), Failure> {
         let (held, more) = samples.split_at(samples.len().min(HELD - self.held.len()));
         self.held.extend_from_slice(held);
         self.count += samples.len();
@@ -47,9 +50,7 @@ impl KeepSamples for Spool {
             }),
         }
     }
-}
 
-impl Spool {
     fn write(&mut self, samples: &[f64]) -> std::io::Result<()> {
         let file = match &mut self.file {
             Some(file) => file,

@@ -4,6 +4,7 @@ use torqcomp_dsp::resample::{Resampled, Resampler};
 
 use super::block::{Block, BlockSource};
 use super::moment::Moment;
+use super::spool::Spool;
 use super::stamps::StampGrid;
 use super::stream::ChannelStream;
 use super::text::ChannelPlan;
@@ -95,26 +96,10 @@ impl UniformStream {
     }
 }
 
-/// Storage of the samples of a record.
-pub(crate) trait KeepSamples: Default {
-    /// Appends samples.
-    ///
-    /// # Errors
-    /// If there is no room.
-    fn keep(&mut self, samples: &[f64]) -> Result<(), Failure>;
-}
-
-impl KeepSamples for Vec<f64> {
-    fn keep(&mut self, samples: &[f64]) -> Result<(), Failure> {
-        self.extend_from_slice(samples);
-        Ok(())
-    }
-}
-
 /// A uniformly sampled record, in SI units of the applied quantity, not yet compensated.
-#[derive(Debug, Clone)]
-pub(crate) struct UniformRecord<S = Vec<f64>> {
-    pub(crate) samples: S,
+#[derive(Debug)]
+pub(crate) struct UniformRecord {
+    pub(crate) samples: Spool,
     /// Time of the first one.
     pub(crate) start: Moment,
     /// Sampling rate in Hz.
@@ -127,7 +112,7 @@ pub(crate) struct UniformRecord<S = Vec<f64>> {
     pub(crate) resampled: Option<Resampled>,
 }
 
-impl<S: KeepSamples> UniformRecord<S> {
+impl UniformRecord {
     /// Reads a channel to its end; `convert` converts its samples to the requested unit, or reports
     /// which cannot be converted.
     ///
@@ -140,7 +125,7 @@ impl<S: KeepSamples> UniformRecord<S> {
         let mut stream = UniformStream::of(stream)?;
         let (rate_hz, start) = (stream.rate_hz, stream.start);
         let rate_std_hz = stream.rate_std_hz;
-        let (mut samples, mut piece) = (S::default(), Vec::new());
+        let (mut samples, mut piece) = (Spool::default(), Vec::new());
         while stream.next(&mut piece, &convert)? {
             samples.keep(&piece)?;
             piece.clear();

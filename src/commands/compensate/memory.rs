@@ -21,7 +21,7 @@ use crate::commands::rows::uniform_parts;
 use crate::failure::Failure;
 use crate::quality::excerpt;
 use crate::recording::moment::Moment;
-use crate::recording::{Spool, UniformRecord};
+use crate::recording::UniformRecord;
 
 /// Maximum block length of the noise estimate.
 const LONGEST_BLOCK: usize = 1 << 12;
@@ -41,8 +41,7 @@ pub(super) fn run(
         undo,
         ..
     } = plan;
-    let record: UniformRecord<Spool> =
-        UniformRecord::read(stream, |values| convert(&chain, values))?;
+    let record = UniformRecord::read(stream, |values| convert(&chain, values))?;
     let count = record.samples.count();
     let scale = 1.0 / chain.applied.factor;
     report.scale = scale;
@@ -76,7 +75,7 @@ pub(super) fn run(
 
 /// Faults of the samples; takes the power above the band.
 fn look_through(
-    record: &UniformRecord<Spool>,
+    record: &UniformRecord,
     band: &Band,
     above: &mut AboveBand,
 ) -> Result<StreamedFaults, Failure> {
@@ -102,7 +101,7 @@ fn look_through(
 
 /// Noise of a record in printed units, if it is long enough.
 fn noise(
-    record: &UniformRecord<Spool>,
+    record: &UniformRecord,
     filter: &InverseFilter,
     scale: f64,
 ) -> Result<Option<RecordNoise>, Failure> {

@@ -7,7 +7,7 @@ use super::report::{CompensateReport, LostSpan, RemovedLine, UndoneEffect};
 use crate::failure::{ErrorCode, Failure};
 use crate::inverse::{Carried, ChainInverse, InverseResult, RecordWindow, Spread};
 use crate::print::{plural, rounded};
-use crate::recording::{Spool, UniformRecord};
+use crate::recording::UniformRecord;
 use crate::stand::{ConstantStd, Stand};
 use crate::warning::Warning;
 
@@ -37,7 +37,7 @@ struct Scales {
 pub(super) fn run(
     undo: &ChainInverse,
     (stand, constant): (&Stand, ConstantStd),
-    record: &UniformRecord<Spool>,
+    record: &UniformRecord,
     report: &mut CompensateReport,
     mut deliver: impl FnMut(usize, &[f64], &[f64]) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
@@ -86,7 +86,7 @@ pub(super) fn run(
     Ok(())
 }
 
-fn check(record: &UniformRecord<Spool>, undo: &ChainInverse) -> Result<(), Failure> {
+fn check(record: &UniformRecord, undo: &ChainInverse) -> Result<(), Failure> {
     let count = record.samples.count();
     if count < 2 {
         return Err(Failure::failed(

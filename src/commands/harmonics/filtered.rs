@@ -6,7 +6,7 @@ use torqcomp_dsp::store::SampleStore;
 
 use super::speed::highest;
 use crate::print::{rounded, short};
-use crate::recording::{Spool, UniformRecord};
+use crate::recording::UniformRecord;
 use crate::warning::Warning;
 
 /// Maximum number of samples evaluated, in one block: an edge between two lines is narrow.
@@ -26,7 +26,7 @@ const NEAR: f64 = 1.05;
 
 /// A warning if orders lie where the spectrum of the record is cut off.
 pub(super) fn warning(
-    record: &UniformRecord<Spool>,
+    record: &UniformRecord,
     fundamental_hz: f64,
     orders: &[f64],
 ) -> Option<Warning> {

@@ -5,7 +5,7 @@ use torqcomp_dsp::store::SampleStore;
 
 use super::speed::{FEWEST, MOST, is_sure};
 use crate::print::rounded;
-use crate::recording::{Spool, UniformRecord};
+use crate::recording::UniformRecord;
 use crate::warning::Warning;
 
 /// Maximum and minimum number of windows.
@@ -17,7 +17,7 @@ const OVER_NOISE: f64 = 8.0;
 
 /// A warning if the amplitude of a significant component changes over the record.
 pub(super) fn warning(
-    record: &UniformRecord<Spool>,
+    record: &UniformRecord,
     fundamental_hz: f64,
     orders: &[f64],
 ) -> Option<Warning> {

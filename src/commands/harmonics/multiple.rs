@@ -5,7 +5,7 @@ use torqcomp_dsp::store::SampleStore;
 
 use super::speed::{FEWEST, FIRST, SPAN, highest, is_sure};
 use crate::print::{enumeration, rounded};
-use crate::recording::{Spool, UniformRecord};
+use crate::recording::UniformRecord;
 use crate::warning::Warning;
 
 /// Parts of the fundamental that may be the speed.
@@ -17,7 +17,7 @@ const STRONG: f64 = 0.2;
 
 /// A warning if lines between the orders are multiples of half or a third of the fundamental.
 pub(super) fn warning(
-    record: &UniformRecord<Spool>,
+    record: &UniformRecord,
     fundamental_hz: f64,
     orders: &[f64],
 ) -> Option<Warning> {

@@ -6,7 +6,7 @@ use torqcomp_dsp::harmonics::Harmonics;
 use torqcomp_dsp::quality::quantisation::quantisation;
 use torqcomp_dsp::store::SampleStore;
 
-use crate::recording::{Spool, UniformRecord};
+use crate::recording::UniformRecord;
 
 /// Uncertainty of an amplitude by its surroundings, relative to that of rounding spread like noise, below which the
 /// rounding is not in the surroundings.
@@ -16,7 +16,7 @@ const MISSING: f64 = 0.5;
 /// more, the errors of rounding are spread like noise, `q √(2/12N)` in each amplitude (B. Widrow and I. Kollár,
 /// *Quantization Noise*, Cambridge 2008). In a quieter record that repeats after the `P` samples of a period,
 /// they repeat as well and are all in the orders: up to `q √(2/12P)`, however long the record.
-pub(super) fn add_rounding(fitted: &mut Harmonics, seen: &[f64], record: &UniformRecord<Spool>) {
+pub(super) fn add_rounding(fitted: &mut Harmonics, seen: &[f64], record: &UniformRecord) {
     let Some(found) = quantisation(seen) else {
         return;
     };

@@ -8,7 +8,7 @@ use torqcomp_dsp::store::SampleStore;
 use super::mains::grids_with_a_line_at;
 use crate::cli::REFINE_SPAN;
 use crate::print::rounded;
-use crate::recording::{Spool, UniformRecord};
+use crate::recording::UniformRecord;
 use crate::warning::Warning;
 
 /// Number of parts of the record whose speeds are compared.
@@ -40,7 +40,7 @@ const THERE: f64 = 10.0;
 /// A warning if another fundamental near the given one gives a much smaller residual: the speed on the nameplate is
 /// not that of the record, and the fitted components are too small.
 pub(super) fn off(
-    record: &UniformRecord<Spool>,
+    record: &UniformRecord,
     fundamental_hz: f64,
     orders: &[f64],
     load_changes: bool,
@@ -99,7 +99,7 @@ pub(super) fn off(
 /// that the highest order loses its phase. It is estimated from differences over a quarter of the shortest period,
 /// where a load step is a short pulse.
 pub(super) fn warning(
-    record: &UniformRecord<Spool>,
+    record: &UniformRecord,
     fundamental_hz: f64,
     orders: &[f64],
 ) -> Option<Warning> {
@@ -187,7 +187,7 @@ const SWAY_RAD: f64 = 0.2;
 /// the higher orders are smeared. The angle is the common part of the phases of the orders, each divided by its order,
 /// per window.
 pub(super) fn sways(
-    record: &UniformRecord<Spool>,
+    record: &UniformRecord,
     fundamental_hz: f64,
     orders: &[f64],
 ) -> Option<Warning> {
@@ -335,7 +335,7 @@ const OVER_SCATTER: f64 = 8.0;
 /// A warning if the mean torque changes over the record, as at a load step: the components depend on the load.
 /// Means are taken over whole periods, in which the components cancel.
 pub(super) fn load_changes(
-    record: &UniformRecord<Spool>,
+    record: &UniformRecord,
     fundamental_hz: f64,
     orders: &[f64],
 ) -> Option<Warning> {
