@@ -175,6 +175,7 @@ impl OneChannel {
 
 /// Where a result goes.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Output")]
 pub struct OutputArgs {
     /// File to write, or - for standard output
     #[arg(short, long, value_name = "OUT", value_parser = PathBufValueParser::new().try_map(result_file))]
@@ -183,7 +184,7 @@ pub struct OutputArgs {
     #[arg(long)]
     pub force: bool,
     /// Do not sync outputs to the disk: faster, but a power cut may leave empty files
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     pub no_sync: bool,
 }
 
@@ -220,9 +221,10 @@ impl OutputArgs {
 
 /// How a verb works on.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Method")]
 pub struct Work {
     /// Threads to use [default: one for each core, at most 8]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256), hide_short_help = true)]
     pub threads: Option<u16>,
 }
 
@@ -237,12 +239,13 @@ impl Work {
 
 /// Which warnings end a verb with code 3.
 #[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Report")]
 pub struct Strictness {
     /// Exit with code 3 if there are warnings
     #[arg(long)]
     pub strict: bool,
     /// Code of a warning that --strict ignores; may be given several times
-    #[arg(long, value_name = "CODE", value_parser = warning_code)]
+    #[arg(long, value_name = "CODE", value_parser = warning_code, hide_short_help = true)]
     pub allow: Vec<String>,
 }
 
@@ -264,41 +267,49 @@ pub struct Compensate {
     #[command(flatten)]
     pub result: OutputArgs,
     /// Stand file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Stand")]
     pub stand: PathBuf,
     /// Compensate up to this frequency, or "rated" for 2400 Hz [default: chosen for the least expected error from the
     /// record's spectrum, its noise and the stand]
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = band)]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = band, help_heading = "Band")]
     pub band: Option<BandOption>,
     /// Units of the result
-    #[arg(long, value_enum, default_value = "si")]
+    #[arg(long, value_enum, default_value = "si", help_heading = "Output")]
     pub units: Units,
     /// Format of the result [default: mcap if the output file ends in .mcap, else csv]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Output")]
     pub format: Option<Format>,
     /// Topic of the result in an MCAP file [default: /torqcomp/compensated_torque]
-    #[arg(long, value_name = "TOPIC")]
+    #[arg(
+        long,
+        value_name = "TOPIC",
+        hide_short_help = true,
+        help_heading = "Output"
+    )]
     pub output_topic: Option<String>,
     /// Significant digits of the result, 1 to 15, or "shortest" for the fewest that restore every bit
-    #[arg(long, value_name = "N", default_value = "12", value_parser = digits)]
+    #[arg(long, value_name = "N", default_value = "12", value_parser = digits, hide_short_help = true,
+        help_heading = "Output")]
     pub digits: Digits,
     /// Add the recorded torque, before compensation, as a third column
-    #[arg(long)]
+    #[arg(long, hide_short_help = true, help_heading = "Output")]
     pub with_recorded: bool,
     /// Process the record as a whole in memory instead of as a stream
-    #[arg(long)]
+    #[arg(long, hide_short_help = true, help_heading = "Method")]
     pub whole_record: bool,
     /// Plot the recorded and the compensated torque to an SVG file
-    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(svg_file))]
+    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(svg_file),
+        help_heading = "Report")]
     pub plot: Option<PathBuf>,
     /// Time range to plot, in seconds
-    #[arg(long, value_name = "FROM..TO", value_parser = range, requires = "plot")]
+    #[arg(long, value_name = "FROM..TO", value_parser = range, requires = "plot", hide_short_help = true,
+        help_heading = "Report")]
     pub plot_range: Option<(f64, f64)>,
     /// Write an HTML report with charts, band, noise and uncertainty
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Report")]
     pub html: Option<PathBuf>,
     /// Print a report as JSON (the samples then need -o FILE)
-    #[arg(long)]
+    #[arg(long, help_heading = "Report")]
     pub json: bool,
     /// What makes a warning a failure.
     #[command(flatten)]
@@ -318,7 +329,8 @@ pub struct Extract {
     #[command(flatten)]
     pub result: OutputArgs,
     /// Significant digits, 1 to 15, or "shortest" for the fewest that restore every bit
-    #[arg(long, value_name = "N", default_value = "shortest", value_parser = digits)]
+    #[arg(long, value_name = "N", default_value = "shortest", value_parser = digits, hide_short_help = true,
+        help_heading = "Output")]
     pub digits: Digits,
     /// What makes a warning a failure.
     #[command(flatten)]
@@ -338,25 +350,27 @@ pub struct Harmonics {
     #[command(flatten)]
     pub result: OutputArgs,
     /// Stand file; not needed for a result of compensate
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Stand")]
     pub stand: Option<PathBuf>,
     /// Fundamental frequency
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive_frequency)]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive_frequency,
+        help_heading = "Method")]
     pub fundamental: f64,
     /// Orders of the fundamental: ranges and single orders, as in 1-20 or 0.5,1,2
-    #[arg(long, value_name = "LIST", default_value = "1-20", value_parser = orders)]
+    #[arg(long, value_name = "LIST", default_value = "1-20", value_parser = orders, help_heading = "Method")]
     pub orders: Orders,
     /// Estimate the fundamental from the data, near the given one
-    #[arg(long)]
+    #[arg(long, help_heading = "Method")]
     pub refine: bool,
     /// Search range around the given fundamental, in percent
-    #[arg(long, value_name = "PERCENT", default_value_t = REFINE_SPAN, requires = "refine", allow_negative_numbers = true, value_parser = percent)]
+    #[arg(long, value_name = "PERCENT", default_value_t = REFINE_SPAN, requires = "refine",
+        allow_negative_numbers = true, value_parser = percent, help_heading = "Method")]
     pub refine_span: f64,
     /// Units of the result
-    #[arg(long, value_enum, default_value = "si")]
+    #[arg(long, value_enum, default_value = "si", help_heading = "Output")]
     pub units: Units,
     /// Print JSON instead of a table
-    #[arg(long)]
+    #[arg(long, help_heading = "Report")]
     pub json: bool,
     /// What makes a warning a failure.
     #[command(flatten)]
@@ -370,23 +384,26 @@ pub struct Table {
     #[command(flatten)]
     pub result: OutputArgs,
     /// Stand file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Stand")]
     pub stand: PathBuf,
     /// First frequency
-    #[arg(long, value_name = "HZ", default_value = "0", allow_negative_numbers = true, value_parser = frequency)]
+    #[arg(long, value_name = "HZ", default_value = "0", allow_negative_numbers = true, value_parser = frequency,
+        help_heading = "Method")]
     pub from: f64,
     /// Last frequency
-    #[arg(long, value_name = "HZ", default_value = "2500", allow_negative_numbers = true, value_parser = frequency)]
+    #[arg(long, value_name = "HZ", default_value = "2500", allow_negative_numbers = true, value_parser = frequency,
+        help_heading = "Method")]
     pub to: f64,
     /// Frequency step
-    #[arg(long, value_name = "HZ", default_value = "10", allow_negative_numbers = true, value_parser = positive_frequency)]
+    #[arg(long, value_name = "HZ", default_value = "10", allow_negative_numbers = true,
+        value_parser = positive_frequency, help_heading = "Method")]
     pub step: f64,
     /// Add standard uncertainties, propagated from those of the stand's constants and effects; a cell is empty if its
     /// uncertainty is unknown
-    #[arg(long)]
+    #[arg(long, help_heading = "Method")]
     pub uncertainty: bool,
     /// Print JSON instead of CSV
-    #[arg(long)]
+    #[arg(long, help_heading = "Report")]
     pub json: bool,
 }
 
@@ -397,13 +414,13 @@ pub struct Predict {
     #[command(flatten)]
     pub result: OutputArgs,
     /// Stand file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Stand")]
     pub stand: PathBuf,
     /// Units of the result
-    #[arg(long, value_enum, default_value = "si")]
+    #[arg(long, value_enum, default_value = "si", help_heading = "Output")]
     pub units: Units,
     /// Print JSON instead of a table
-    #[arg(long)]
+    #[arg(long, help_heading = "Report")]
     pub json: bool,
 }
 
@@ -424,10 +441,11 @@ pub struct Inspect {
     #[command(flatten)]
     pub many: BatchOptions,
     /// Plot the channels to an SVG file
-    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(svg_file))]
+    #[arg(long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(svg_file),
+        help_heading = "Report")]
     pub plot: Option<PathBuf>,
     /// Print JSON instead of a table
-    #[arg(long)]
+    #[arg(long, help_heading = "Report")]
     pub json: bool,
     /// What makes a warning a failure.
     #[command(flatten)]

@@ -60,16 +60,16 @@ pub struct Findings {
     #[command(flatten)]
     pub result: OutputArgs,
     /// Stand file [default: that of -o, if it exists]
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Stand")]
     pub stand: Option<PathBuf>,
     /// Units of printed values
-    #[arg(long, value_enum, default_value = "si")]
+    #[arg(long, value_enum, default_value = "si", help_heading = "Output")]
     pub units: Units,
     /// Print JSON instead of text
-    #[arg(long)]
+    #[arg(long, help_heading = "Report")]
     pub json: bool,
     /// Write an HTML page with the fit, the residual and the constants
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Report")]
     pub html: Option<PathBuf>,
     /// What makes a warning a failure.
     #[command(flatten)]
@@ -78,6 +78,7 @@ pub struct Findings {
 
 /// A constant known from elsewhere; by default, that of the stand file.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Stand")]
 pub struct Anchors {
     /// Known inertia, from which stiffness and damping follow
     #[arg(long, value_name = "QUANTITY", conflicts_with = "stiffness")]
@@ -97,10 +98,10 @@ pub struct Decay {
     #[command(flatten)]
     pub choice: ChannelChoice,
     /// Number of modes [default: chosen from the data]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=20))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=20), help_heading = "Method")]
     pub modes: Option<u8>,
     /// Frequencies of the modes, in Hz
-    #[arg(long, value_name = "FROM..TO", value_parser = range)]
+    #[arg(long, value_name = "FROM..TO", value_parser = range, help_heading = "Band")]
     pub band: Option<(f64, f64)>,
     /// Known constants.
     #[command(flatten)]
@@ -121,40 +122,60 @@ pub struct Response {
     pub inputs: Vec<PathBuf>,
     /// Channel of the excitation (hammer force, exciter force, known torque): its number in inspect, heading or name;
     /// for an MCAP file topic and field, as in '/joint_states.effort[name=motor]', or the field of --topic
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Input")]
     pub applied: String,
     /// Unit of the excitation, if its heading does not give it
-    #[arg(long, value_name = "UNIT")]
+    #[arg(
+        long,
+        value_name = "UNIT",
+        hide_short_help = true,
+        help_heading = "Input"
+    )]
     pub applied_unit: Option<String>,
     /// Radius at which a force acts: torque = force x radius
-    #[arg(long, value_name = "QUANTITY")]
+    #[arg(long, value_name = "QUANTITY", help_heading = "Stand")]
     pub radius: Option<String>,
     /// Channel of the response
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Input")]
     pub measured: String,
     /// Unit of the response, if its heading does not give it
-    #[arg(long, value_name = "UNIT")]
+    #[arg(
+        long,
+        value_name = "UNIT",
+        hide_short_help = true,
+        help_heading = "Input"
+    )]
     pub measured_unit: Option<String>,
     /// Quantity of the measured channel [default: from its unit]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, hide_short_help = true, help_heading = "Input")]
     pub measured_as: Option<Motion>,
     /// How the stand was excited [default: detected from the data]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Stand")]
     pub excitation: Option<Excitation>,
     /// Frequencies to fit, in Hz [default: where the excitation has power]
-    #[arg(long, value_name = "FROM..TO", value_parser = range)]
+    #[arg(long, value_name = "FROM..TO", value_parser = range, help_heading = "Band")]
     pub band: Option<(f64, f64)>,
     /// Number of modes [default: chosen by the error on held-out data]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=40))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=40), help_heading = "Method")]
     pub modes: Option<u8>,
     /// Period of a periodic excitation, in samples [default: detected from the data]
-    #[arg(long, value_name = "N")]
+    #[arg(
+        long,
+        value_name = "N",
+        hide_short_help = true,
+        help_heading = "Method"
+    )]
     pub period: Option<usize>,
     /// Length of a segment of noise, in samples [default: from the length of the record]
-    #[arg(long, value_name = "N")]
+    #[arg(
+        long,
+        value_name = "N",
+        hide_short_help = true,
+        help_heading = "Method"
+    )]
     pub segment: Option<usize>,
     /// Also fit a delay of the measured channel
-    #[arg(long)]
+    #[arg(long, hide_short_help = true, help_heading = "Method")]
     pub delay: bool,
     /// Known constants.
     #[command(flatten)]
@@ -174,28 +195,33 @@ pub struct Runup {
     #[arg(value_name = "INPUT")]
     pub input: PathBuf,
     /// Column of the position, speed or acceleration
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Input")]
     pub motion: String,
     /// Unit of the motion, if its heading does not give it: rad, rpm, m, m/s^2
-    #[arg(long, value_name = "UNIT")]
+    #[arg(long, value_name = "UNIT", help_heading = "Input")]
     pub motion_unit: Option<String>,
     /// Column of the torque or force
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Input")]
     pub torque: String,
     /// Unit of the torque or force, if its heading does not give it
-    #[arg(long, value_name = "UNIT")]
+    #[arg(long, value_name = "UNIT", help_heading = "Input")]
     pub torque_unit: Option<String>,
     /// Torque or force per unit of its channel, such as "35.15 N/V"
-    #[arg(long, value_name = "QUANTITY", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "QUANTITY",
+        allow_hyphen_values = true,
+        help_heading = "Input"
+    )]
     pub torque_factor: Option<String>,
     /// Radius at which a force drives a rotating body
-    #[arg(long, value_name = "QUANTITY")]
+    #[arg(long, value_name = "QUANTITY", help_heading = "Stand")]
     pub radius: Option<String>,
     /// Let viscous friction differ by direction
-    #[arg(long)]
+    #[arg(long, help_heading = "Method")]
     pub by_direction: bool,
     /// Half-width of the averaging window, in seconds [default: chosen from the data]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", help_heading = "Method")]
     pub window: Option<f64>,
     /// How the file is read.
     #[command(flatten)]
@@ -212,34 +238,34 @@ pub struct Static {
     #[arg(value_name = "INPUT")]
     pub input: PathBuf,
     /// Column of the load
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Input")]
     pub load: String,
     /// Unit of the load, if its heading does not give it
-    #[arg(long, value_name = "UNIT")]
+    #[arg(long, value_name = "UNIT", help_heading = "Input")]
     pub load_unit: Option<String>,
     /// Radius at which a load given as a force or a mass acts
-    #[arg(long, value_name = "QUANTITY")]
+    #[arg(long, value_name = "QUANTITY", help_heading = "Stand")]
     pub radius: Option<String>,
     /// Local acceleration of gravity, for a load given as a mass
-    #[arg(long, value_name = "QUANTITY")]
+    #[arg(long, value_name = "QUANTITY", help_heading = "Method")]
     pub gravity: Option<String>,
     /// Column of the reading
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Input")]
     pub reading: String,
     /// Unit of the reading, if its heading does not give it
-    #[arg(long, value_name = "UNIT")]
+    #[arg(long, value_name = "UNIT", help_heading = "Input")]
     pub reading_unit: Option<String>,
     /// Column of the standard uncertainty of each reading, in the unit of the reading
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Input")]
     pub std: Option<String>,
     /// Column with the number of the series [default: a new one after each return to no load]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Input")]
     pub series: Option<String>,
     /// Column with the number of the mounting position
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Input")]
     pub position: Option<String>,
     /// Degree of the curve
-    #[arg(long, value_name = "1|3", default_value = "1", value_parser = degree)]
+    #[arg(long, value_name = "1|3", default_value = "1", value_parser = degree, help_heading = "Method")]
     pub degree: usize,
     /// How the file is read.
     #[command(flatten)]

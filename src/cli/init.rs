@@ -32,14 +32,9 @@ pub enum InitFrom {
 ///
 /// Asks for what is not given when it runs on a terminal; in a script the flags say it.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Examples:\n  torqcomp init -o stand.toml\n  torqcomp init --from transducer --sensitivity \"2 mV/V\" \
-                        --rated-torque \"50 N m\" \
-                        --std \"sensitivity=0.001 mV/V\" --natural-frequency \"590 Hz\" --damping-ratio 0.02 -o stand.toml"
-)]
 pub struct Init {
     /// What there is to start from
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Method")]
     pub from: Option<InitFrom>,
     /// Name of the stand
     #[arg(long, value_name = "TEXT")]
@@ -100,7 +95,7 @@ pub struct Init {
     pub zero: Option<String>,
     /// Standard uncertainty of one of the values above, named by its flag, such as "sensitivity=0.0005 mV/V";
     /// repeatable. For a limit within which all values are equally likely, give the limit divided by 1.73
-    #[arg(long, value_name = "FLAG=QUANTITY", value_parser = named_std)]
+    #[arg(long, value_name = "FLAG=QUANTITY", value_parser = named_std, help_heading = "Input")]
     pub std: Vec<(String, String)>,
     /// Output.
     #[command(flatten)]

@@ -11,42 +11,44 @@ use crate::io::sum;
 
 /// Many recordings, each read by itself.
 #[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Many recordings")]
 pub struct BatchOptions {
     /// Also process the recordings listed in a file, one path per line (- for standard input)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
     pub files_from: Option<PathBuf>,
     /// Paths of --files-from end with a zero byte instead of a newline
-    #[arg(short = '0', long, requires = "files_from")]
+    #[arg(short = '0', long, requires = "files_from", hide_short_help = true)]
     pub null: bool,
     /// Names of the results in the folder of -o: {stem} and {ext} are the recording's name before and after its last
     /// dot, {name} is all of it
-    #[arg(long, value_name = "TEMPLATE", value_parser = template, help_heading = "Many recordings")]
+    #[arg(long, value_name = "TEMPLATE", value_parser = template, hide_short_help = true)]
     pub name: Option<String>,
     /// Skip recordings whose results exist and, by the manifest, were made from the same recording, stand, options and
     /// version; outdated results are replaced
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     pub skip_existing: bool,
     /// List of inputs and results, a JSON line for each recording [default: torqcomp-manifest.jsonl in the folder of
     /// -o]
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
     pub manifest: Option<PathBuf>,
     /// Write a CSV table with a row for each recording
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
     pub summary: Option<PathBuf>,
     /// Recordings processed in parallel [default: SLURM_CPUS_PER_TASK, else the cores that this process may use]
-    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024),
+        hide_short_help = true)]
     pub jobs: Option<u16>,
     /// Start no further recording after the first failure
-    #[arg(long, conflicts_with = "max_failures")]
+    #[arg(long, conflicts_with = "max_failures", hide_short_help = true)]
     pub fail_fast: bool,
     /// Start no further recording after N failures
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), hide_short_help = true)]
     pub max_failures: Option<u32>,
     /// Process only the I-th of N parts of the recordings, I from 1; each stays in its part when others are added
-    #[arg(long, value_name = "I/N", value_parser = shard)]
+    #[arg(long, value_name = "I/N", value_parser = shard, hide_short_help = true)]
     pub shard: Option<Shard>,
     /// List what would be done, but write nothing
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     pub dry_run: bool,
 }
 
@@ -89,7 +91,7 @@ pub struct Merge {
     #[command(flatten)]
     pub result: OutputArgs,
     /// Print a report as JSON (the table then needs -o FILE)
-    #[arg(long)]
+    #[arg(long, help_heading = "Report")]
     pub json: bool,
 }
 

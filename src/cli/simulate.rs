@@ -20,21 +20,26 @@ pub struct Simulate {
     #[command(flatten)]
     pub result: OutputArgs,
     /// Stand file
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Stand")]
     pub stand: PathBuf,
     /// Channel with the applied quantity: its number in inspect, heading or name; for an MCAP file topic and field, as
     /// in '/joint_states.effort[name=motor]', or the field of --topic
-    #[arg(long, value_name = "COL")]
+    #[arg(long, value_name = "COL", help_heading = "Input")]
     pub applied: Option<String>,
     /// Behaviour of the applied quantity between its samples
-    #[arg(long, value_enum, default_value = "band-limited")]
+    #[arg(
+        long,
+        value_enum,
+        default_value = "band-limited",
+        help_heading = "Method"
+    )]
     pub between: Between,
     /// The recording is one period of the applied quantity, or a whole number of them: give the steady-state response
     /// to its repetition. Without it, the stand is at rest and without load before the first sample
-    #[arg(long)]
+    #[arg(long, help_heading = "Method")]
     pub periodic: bool,
     /// Unit of the applied quantity, if its heading does not give it
-    #[arg(long, value_name = "UNIT")]
+    #[arg(long, value_name = "UNIT", help_heading = "Input")]
     pub unit: Option<String>,
     /// How the recording is read.
     #[command(flatten)]
@@ -43,10 +48,11 @@ pub struct Simulate {
     #[command(flatten)]
     pub many: BatchOptions,
     /// Significant digits of the result, 1 to 15, or "shortest" for the fewest that restore every bit
-    #[arg(long, value_name = "N", default_value = "12", value_parser = digits)]
+    #[arg(long, value_name = "N", default_value = "12", value_parser = digits, hide_short_help = true,
+        help_heading = "Output")]
     pub digits: Digits,
     /// Print a JSON report to standard output; the record then needs -o
-    #[arg(long)]
+    #[arg(long, help_heading = "Report")]
     pub json: bool,
     /// What makes a warning a failure.
     #[command(flatten)]

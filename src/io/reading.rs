@@ -20,15 +20,16 @@ pub enum Delimiter {
 
 /// How a recording is read, the same for every verb.
 #[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Input")]
 pub struct Reading {
     /// Marks of a table.
     #[command(flatten)]
     pub dialect: DialectOverride,
     /// Column with the time stamps
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", hide_short_help = true)]
     pub time_column: Option<String>,
     /// Unit of the time stamps, if their heading does not give it: s, ms, us, min
-    #[arg(long, value_name = "UNIT")]
+    #[arg(long, value_name = "UNIT", hide_short_help = true)]
     pub time_unit: Option<String>,
     /// Sampling rate, where there are no time stamps or they are wrong; with --resample, the rate
     /// to interpolate to
@@ -38,7 +39,7 @@ pub struct Reading {
     #[arg(long)]
     pub resample: bool,
     /// Full scale of a WAV file, with its unit, as in "10 V"
-    #[arg(long, value_name = "QUANTITY", value_parser = full_scale)]
+    #[arg(long, value_name = "QUANTITY", value_parser = full_scale, hide_short_help = true)]
     pub full_scale: Option<FullScale>,
     /// Part of the record to use: seconds on its time axis (0.5..2), times of day or dates; either end may be left out
     #[arg(long, value_name = "FROM..TO", value_parser = time_range, allow_hyphen_values = true)]
@@ -50,13 +51,13 @@ pub struct Reading {
     #[arg(long, value_name = "TOPIC")]
     pub topic: Option<String>,
     /// Clock for message times: header (their own stamp), log or publish [default: header if there is one, else log]
-    #[arg(long, value_name = "CLOCK", value_parser = clock)]
+    #[arg(long, value_name = "CLOCK", value_parser = clock, hide_short_help = true)]
     pub time: Option<TimeChoice>,
     /// Field with the sample spacing, for messages with many samples
-    #[arg(long, value_name = "FIELD")]
+    #[arg(long, value_name = "FIELD", hide_short_help = true)]
     pub spacing: Option<String>,
     /// Largest metadata, schema and channel records read from an MCAP file, in MiB [default: 64]
-    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1024))]
+    #[arg(long, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1024), hide_short_help = true)]
     pub longest_metadata: Option<u64>,
     /// Whether stamps may be irregular, because they are only handed on.
     #[arg(skip)]
@@ -94,12 +95,13 @@ pub enum Fill {
 
 /// Marks of a table, given by the user instead of found in the file.
 #[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Input")]
 pub struct DialectOverride {
     /// Cell separator: , ; | tab space none
-    #[arg(long, value_name = "MARK", value_parser = delimiter)]
+    #[arg(long, value_name = "MARK", value_parser = delimiter, hide_short_help = true)]
     pub delimiter: Option<Delimiter>,
     /// Decimal mark: . or ,
-    #[arg(long, value_name = "MARK", value_parser = decimal)]
+    #[arg(long, value_name = "MARK", value_parser = decimal, hide_short_help = true)]
     pub decimal: Option<u8>,
 }
 
@@ -118,6 +120,7 @@ impl Reading {
 
 /// Which channel of a recording is read, and its unit if the file does not say or is wrong.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Input")]
 pub struct ChannelChoice {
     /// Channel to read: its number in inspect, its heading, its name, or a unique part of it
     #[arg(long, value_name = "NAME")]
@@ -136,7 +139,8 @@ pub struct ChannelChoice {
         long,
         value_name = "PATH",
         conflicts_with = "topic",
-        help = "Topic and field of an MCAP file in one, as in '/joint_states.effort[name=motor]'"
+        help = "Topic and field of an MCAP file in one, as in '/joint_states.effort[name=motor]'",
+        hide_short_help = true
     )]
     pub signal: Option<String>,
     /// Unit of the signal, if its heading does not give it: V, mV, "N m", "ft lbf", ustrain

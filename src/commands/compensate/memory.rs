@@ -20,8 +20,8 @@ use crate::commands::convert;
 use crate::commands::rows::uniform_parts;
 use crate::failure::Failure;
 use crate::quality::excerpt;
-use crate::recording::moment::Moment;
 use crate::recording::UniformRecord;
+use crate::recording::moment::Moment;
 
 /// Maximum block length of the noise estimate.
 const LONGEST_BLOCK: usize = 1 << 12;
