@@ -6,6 +6,8 @@ use std::fmt::Write as _;
 use std::io::{BufRead, IsTerminal, Write};
 use std::path::Path;
 
+use clap::ValueEnum;
+
 use self::questions::{BRIDGE, DRAWING, MECHANICS, Question, TRANSDUCER};
 use super::{Outcome, conclude};
 use crate::cli::Strictness;
@@ -34,16 +36,13 @@ const SECTIONS: [(&str, &str); 6] = [
 
 /// Runs the verb.
 pub fn run(args: &Init) -> Result<Outcome, Failure> {
-    let (input, mut errors) = (std::io::stdin(), std::io::stderr());
+    let (mut input, mut errors) = (std::io::stdin().lock(), std::io::stderr());
     let can_ask = input.is_terminal() && errors.is_terminal();
     let mut asked = can_ask.then(|| Dialogue {
-        input: input.lock(),
+        input: &mut input,
         output: &mut errors,
     });
-    let text = match &mut asked {
-        Some(dialogue) => compose(args, Some(dialogue))?,
-        None => compose(args, None::<&mut Dialogue<std::io::Empty, std::io::Sink>>)?,
-    };
+    let text = compose(args, asked.as_mut())?;
     let stand = stand::parse("the new stand file", &text)
         .map_err(|failure| Failure::usage(ErrorCode::InvalidValue, failure.to_string()))?;
     let mut output = args.result.open(&[])?;
@@ -53,12 +52,12 @@ pub fn run(args: &Init) -> Result<Outcome, Failure> {
 }
 
 /// A dialogue with a user at a terminal.
-struct Dialogue<R, W> {
-    input: R,
-    output: W,
+struct Dialogue<'a> {
+    input: &'a mut dyn BufRead,
+    output: &'a mut dyn Write,
 }
 
-impl<R: BufRead, W: Write> Dialogue<R, W> {
+impl Dialogue<'_> {
     /// The answer to a question, empty for none; asked again until `check` accepts it.
     fn ask(
         &mut self,
@@ -88,10 +87,7 @@ impl<R: BufRead, W: Write> Dialogue<R, W> {
 }
 
 /// The text of the file.
-fn compose<R: BufRead, W: Write>(
-    args: &Init,
-    mut dialogue: Option<&mut Dialogue<R, W>>,
-) -> Result<String, Failure> {
+fn compose(args: &Init, mut dialogue: Option<&mut Dialogue>) -> Result<String, Failure> {
     let from = match (args.from, &mut dialogue) {
         (Some(from), _) => from,
         (None, Some(dialogue)) => {
@@ -177,10 +173,10 @@ fn beyond_loop(answers: &[Answer]) -> Result<(), Failure> {
 }
 
 /// Standard uncertainty of an answer, from a flag or asked for.
-fn std_of<R: BufRead, W: Write>(
+fn std_of(
     args: &Init,
     (question, value): (&Question, &str),
-    dialogue: Option<&mut Dialogue<R, W>>,
+    dialogue: Option<&mut Dialogue>,
 ) -> Result<Option<String>, Failure> {
     Ok(match (args.given_std(question.flag), dialogue) {
         (Some(given), _) => Some(given.to_owned()),
@@ -265,27 +261,15 @@ fn of(from: InitFrom) -> &'static [Question] {
     }
 }
 
-const SOURCES: [InitFrom; 4] = [
-    InitFrom::Transducer,
-    InitFrom::Bridge,
-    InitFrom::Drawing,
-    InitFrom::Unknown,
-];
-
-fn word(from: InitFrom) -> &'static str {
-    match from {
-        InitFrom::Transducer => "transducer",
-        InitFrom::Bridge => "bridge",
-        InitFrom::Drawing => "drawing",
-        InitFrom::Unknown => "unknown",
-    }
+/// A source as on the command line.
+fn word(from: InitFrom) -> String {
+    let word = from.to_possible_value();
+    word.map_or_else(String::new, |word| word.get_name().to_owned())
 }
 
 fn source(text: &str) -> Result<InitFrom, String> {
-    let found = SOURCES
-        .into_iter()
-        .find(|from| word(*from) == text.to_lowercase());
-    found.ok_or_else(|| "write transducer, bridge, drawing or unknown".to_owned())
+    InitFrom::from_str(text, true)
+        .map_err(|_| "write transducer, bridge, drawing or unknown".to_owned())
 }
 
 impl Init {
@@ -375,7 +359,7 @@ mod tests {
         let answers = "data sheet\ntransducer\n2 mV/V\n\n\n\n\n\n590\n590 Hz\n1 Hz\n0.02\n\n";
         let mut said = Vec::new();
         let mut dialogue = Dialogue {
-            input: answers.as_bytes(),
+            input: &mut answers.as_bytes(),
             output: &mut said,
         };
         let text = compose(&args, Some(&mut dialogue)).unwrap();
