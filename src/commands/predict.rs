@@ -29,12 +29,11 @@ pub fn run(args: &Predict) -> Result<Outcome, Failure> {
     let drawing = Drawing::of(&stand)?;
     let constants = drawing.constants(args.units.into())?;
     if constants.iter().all(|c| c.predicted.is_none()) {
-        return Err(Failure::failed(
+        return Err(stand.failed(
             ErrorCode::IncompleteStand,
             "there is no drawing to calculate constants from; add [beam], [[parts]], \
              [friction], or [gage] and [bridge]",
-        )
-        .at(&stand.file));
+        ));
     }
     let output = args.result.open(&[args.stand.as_path()])?;
     let report = PredictReport {
@@ -72,9 +71,7 @@ struct Stiffness {
 
 impl<'a> Drawing<'a> {
     fn of(stand: &'a Stand) -> Result<Self, Failure> {
-        let wrong = |error: &dyn std::fmt::Display| {
-            Failure::failed(ErrorCode::InvalidStand, error).at(&stand.file)
-        };
+        let wrong = |error: &dyn std::fmt::Display| stand.failed(ErrorCode::InvalidStand, error);
         let parts: Vec<&Estimate> = stand.parts.iter().map(|p| &p.inertia).collect();
         let inertia = if parts.is_empty() {
             None
@@ -191,7 +188,7 @@ impl<'a> Drawing<'a> {
         };
         Estimate::derive(kind, "drawing", &inputs, f)
             .map(Some)
-            .map_err(|error| Failure::failed(ErrorCode::InvalidStand, error).at(&self.stand.file))
+            .map_err(|error| self.stand.failed(ErrorCode::InvalidStand, error))
     }
 
     /// Adds the contribution of each effect of the drawing to a constant derived from the stiffness.
@@ -348,9 +345,7 @@ impl Measured {
                     Estimate::derive(kind, "inertia, damping and stiffness", &inputs, |x| {
                         SecondOrder::new(x[0], x[1], x[2]).map_or(f64::NAN, |stand| f(&stand))
                     })
-                    .map_err(|error| {
-                        Failure::failed(ErrorCode::InvalidStand, error).at(&stand.file)
-                    })
+                    .map_err(|error| stand.failed(ErrorCode::InvalidStand, error))
                 };
                 Ok(Self {
                     inertia: Some(inertia.clone()),

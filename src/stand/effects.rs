@@ -170,7 +170,7 @@ impl Stand {
     fn refuse_unknown_shapes(&self, modes: &ModalResponse) -> Result<(), Failure> {
         let torque = self.effects.iter().find(|e| e.form.stage == Stage::Stand);
         match (torque, modes.at_gage()) {
-            (Some(torque), None) => Err(Failure::failed(
+            (Some(torque), None) => Err(self.failed(
                 ErrorCode::NotInvertible,
                 format_args!(
                     "the effect \"{}\" acts at the gage, and how far it moves each mode there does not follow from \
@@ -178,8 +178,7 @@ impl Stand {
                      leave the effect out",
                     torque.effect.name
                 ),
-            )
-            .at(&self.file)),
+            )),
             _ => Ok(()),
         }
     }
@@ -192,15 +191,14 @@ impl Stand {
         let plain = self.mechanics()?.response.clone();
         let chain = self.chain()?;
         if let Some(link) = chain.links().iter().find(|link| !link.is_linear()) {
-            return Err(Failure::failed(
+            return Err(self.failed(
                 ErrorCode::NotInvertible,
                 format_args!(
                     "the effect \"{}\" has no frequency response; remove it to use the plain stand, or remove its \
                      effect from the record with compensate",
                     link.effect
                 ),
-            )
-            .at(&self.file));
+            ));
         }
         Ok(Arc::new(move |frequency_hz| {
             chain.divide_out(plain.inverse(frequency_hz), frequency_hz)

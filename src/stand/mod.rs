@@ -21,6 +21,7 @@ pub mod update;
 
 use num_complex::Complex64;
 use std::f64::consts::TAU;
+use std::fmt::Display;
 use torqcomp_dsp::bridge::{BridgeLayout, Leads, Supply};
 use torqcomp_dsp::recorder::{LowPass, Recorder};
 use torqcomp_model::{Estimate, ModalResponse, Mode, ParameterStd, SecondOrder};
@@ -256,18 +257,22 @@ pub struct RecorderData {
 }
 
 impl Stand {
+    /// A failure due to the stand file.
+    pub(crate) fn failed(&self, code: ErrorCode, message: impl Display) -> Failure {
+        Failure::failed(code, message).at(&self.file)
+    }
+
     /// The mechanics, or a failure that says what to write.
     ///
     /// # Errors
     /// If the stand file gives none.
     pub fn mechanics(&self) -> Result<&Mechanics, Failure> {
         self.mechanics.as_ref().ok_or_else(|| {
-            Failure::failed(
+            self.failed(
                 ErrorCode::IncompleteStand,
                 "the response of the stand is not given; add [mechanics] with inertia, damping \
                  and stiffness, or with natural_frequency and damping_ratio",
             )
-            .at(&self.file)
         })
     }
 }

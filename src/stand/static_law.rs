@@ -102,7 +102,7 @@ impl Stand {
             Some((of @ (Voltage | Ratio), zero))
                 if matches!(signal, Voltage | Ratio) && zero != 0.0 =>
             {
-                Err(Failure::failed(
+                Err(self.failed(
                     ErrorCode::InvalidStand,
                     format_args!(
                         "[recorder] zero is in {} and the record in {}; give the zero as the record has it, as in \
@@ -111,8 +111,7 @@ impl Stand {
                         signal.usual_unit().0,
                         signal.usual_unit().0
                     ),
-                )
-                .at(&self.file))
+                ))
             }
             _ => Ok(None),
         }
@@ -138,12 +137,11 @@ impl Stand {
     fn excitation_v(&self) -> Result<f64, Failure> {
         match self.bridge.as_ref().and_then(|bridge| bridge.supply) {
             Some(Supply::ConstantVoltage { volts }) => Ok(volts),
-            _ => Err(Failure::failed(
+            _ => Err(self.failed(
                 ErrorCode::IncompleteStand,
                 "converting between volts and mV/V needs the voltage of the bridge's supply, which is not given; add \
                  [bridge] excitation = \"5 V\"",
-            )
-            .at(&self.file)),
+            )),
         }
     }
 
@@ -216,14 +214,13 @@ impl Stand {
                 "[recorder] zero = \"60 kHz\", or [calibration] with zero_frequency and frequency_at_rated"
             }
         };
-        Failure::failed(
+        self.failed(
             ErrorCode::IncompleteStand,
             format_args!(
                 "a current or a frequency is seldom zero at no load, and the output there is not given; add \
                  {example}"
             ),
         )
-        .at(&self.file)
     }
 
     /// Relative standard uncertainty of the bridge's supply.
@@ -271,14 +268,13 @@ impl Stand {
             TransducerSignal::Ratio => 1.0 / self.ratio_excitation_v()?,
             TransducerSignal::Current | TransducerSignal::Frequency => {
                 let unit = signal.usual_unit().0;
-                return Err(Failure::failed(
+                return Err(self.failed(
                     ErrorCode::IncompleteStand,
                     format_args!(
                         "a record in {unit} cannot be converted to torque; add [calibration] with sensitivity = \"8 \
                          {unit}\" and rated_torque = \"50 N m\""
                     ),
-                )
-                .at(&self.file));
+                ));
             }
         };
         let bridge = self.bridge_fed_by(match signal {
@@ -330,13 +326,12 @@ impl Stand {
     fn radius(&self) -> Result<f64, Failure> {
         match &self.beam {
             Some(beam) => Ok(beam.radius.value()),
-            None => Err(Failure::failed(
+            None => Err(self.failed(
                 ErrorCode::IncompleteStand,
                 "the radius at which the recorded force acts is not given; add [calibration] lever_arm = \"0.5 m\", \
                  or, to compensate the force itself, give [mechanics] as natural_frequency and damping_ratio with \
                  static_gain = \"1 N/N\"",
-            )
-            .at(&self.file)),
+            )),
         }
     }
 
@@ -358,12 +353,11 @@ impl Stand {
         match self.bridge.as_ref().and_then(|bridge| bridge.supply) {
             None => Ok(1.0),
             Some(Supply::ConstantVoltage { volts }) => Ok(volts),
-            Some(_) => Err(Failure::failed(
+            Some(_) => Err(self.failed(
                 ErrorCode::InvalidStand,
                 "a ratio of voltages refers to a supply of constant voltage, and [bridge] has excitation_current; \
                  give excitation = \"5 V\", or record in volts",
-            )
-            .at(&self.file)),
+            )),
         }
     }
 
@@ -378,19 +372,17 @@ impl Stand {
     /// The same with a supply other than that of the file.
     fn bridge_fed_by(&self, supply: Option<Supply>) -> Result<Bridge, Failure> {
         let (Some(gage), Some(bridge)) = (&self.gage, &self.bridge) else {
-            return Err(Failure::failed(
+            return Err(self.failed(
                 ErrorCode::IncompleteStand,
                 "the record cannot be converted to torque; add [calibration], as torque_per_volt = \"12.5 N m/V\" or \
                  torque_per_ratio = \"25 N m/(mV/V)\", or the sections [beam], [gage] and [bridge]",
-            )
-            .at(&self.file));
+            ));
         };
         let lacks = |what: &str| {
-            Failure::failed(
+            self.failed(
                 ErrorCode::IncompleteStand,
                 format_args!("[bridge] lacks {what}"),
             )
-            .at(&self.file)
         };
         let layout = bridge.layout.ok_or_else(|| {
             lacks("its layout; write layout = \"quarter\", \"half\", \"half-opposite\", \"half-poisson\", \"full\" or \"full-poisson\"")
@@ -398,9 +390,7 @@ impl Stand {
         let supply = supply.or(bridge.supply).ok_or_else(|| {
             lacks("its supply; write excitation = \"5 V\" or excitation_current = \"2 mA\"")
         })?;
-        let wrong = |error: &dyn std::fmt::Display| {
-            Failure::failed(ErrorCode::InvalidStand, error).at(&self.file)
-        };
+        let wrong = |error: &dyn std::fmt::Display| self.failed(ErrorCode::InvalidStand, error);
         let unbonded = gage.gage.unbonded_resistance_ohm();
         let bonded = gage
             .gage
@@ -428,15 +418,14 @@ impl Stand {
         let beam = self.beam.as_ref();
         let placed = beam.and_then(|b| b.gage_position.as_ref().map(|p| (b, p)));
         let Some((beam, position)) = placed else {
-            return Err(Failure::failed(
+            return Err(self.failed(
                 ErrorCode::IncompleteStand,
                 "strain cannot be converted to torque; add [beam] with gage_position, or \
                  [calibration] with torque_per_volt or torque_per_ratio",
-            )
-            .at(&self.file));
+            ));
         };
         beam.full
             .torque_per_strain_n_m(beam.radius.value(), position.value())
-            .map_err(|error| Failure::failed(ErrorCode::InvalidStand, error).at(&self.file))
+            .map_err(|error| self.failed(ErrorCode::InvalidStand, error))
     }
 }

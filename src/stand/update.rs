@@ -155,14 +155,13 @@ pub const MODAL: [&str; 2] = ["natural_frequency", "damping_ratio"];
 pub fn update(name: &str, existing: Option<&str>, entries: &[Entry]) -> Result<String, Failure> {
     let mut document = match existing {
         Some(text) => text.parse::<DocumentMut>().map_err(|error| {
-            Failure::failed(
-                ErrorCode::InvalidStand,
+            invalid(
+                name,
                 format_args!(
                     "cannot be updated: {}; correct it, or write to another file",
                     error.message().replace('\n', ", ")
                 ),
             )
-            .at(name)
         })?,
         None => DocumentMut::new(),
     };
@@ -172,14 +171,13 @@ pub fn update(name: &str, existing: Option<&str>, entries: &[Entry]) -> Result<S
             document["schema"] = value(SCHEMA);
         }
         _ => {
-            return Err(Failure::failed(
-                ErrorCode::InvalidStand,
+            return Err(invalid(
+                name,
                 format_args!(
                     "this is not a stand file (schema = \"{SCHEMA}\" is missing); write to another \
                  file"
                 ),
-            )
-            .at(name));
+            ));
         }
     }
     make_room(name, &mut document, entries)?;
@@ -213,11 +211,10 @@ fn make_room(name: &str, document: &mut DocumentMut, entries: &[Entry]) -> Resul
     }
     let gain = document.get("mechanics").and_then(|m| m.get("static_gain"));
     if gain.is_some() {
-        return Err(Failure::failed(
-            ErrorCode::InvalidStand,
+        return Err(invalid(
+            name,
             "[mechanics] has static_gain, which already converts the record; remove it, or write to another file",
-        )
-        .at(name));
+        ));
     }
     if let Some(table) = document
         .get_mut("calibration")
@@ -248,14 +245,13 @@ fn put_modes(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<()
     let mechanics = document.get("mechanics").and_then(Item::as_table_like);
     let mut single = CONSTANTS.iter().chain(&MODAL);
     if let Some(key) = single.find(|key| mechanics.is_some_and(|table| table.contains_key(key))) {
-        return Err(Failure::failed(
-            ErrorCode::InvalidStand,
+        return Err(invalid(
+            name,
             format_args!(
                 "[mechanics] has {key}, so that [[modes]] cannot be written beside it; remove it, or write to \
                  another file"
             ),
-        )
-        .at(name));
+        ));
     }
     let tables = entry.content.as_array().into_iter().flatten();
     let inline = tables.filter_map(Value::as_inline_table);
@@ -296,25 +292,23 @@ fn put(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<(), Fail
     }
     let is_single = CONSTANTS.contains(&entry.key) || MODAL.contains(&entry.key);
     if is_single && document.contains_key(MODES) {
-        return Err(Failure::failed(
-            ErrorCode::InvalidStand,
+        return Err(invalid(
+            name,
             format_args!(
                 "it has [[modes]], so that {} of a single mode cannot be written beside them; remove them, or write \
                  to another file",
                 entry.key
             ),
-        )
-        .at(name));
+        ));
     }
     let section = document
         .entry(entry.section)
         .or_insert_with(|| Item::Table(Table::new()));
     let Some(table) = section.as_table_like_mut() else {
-        return Err(Failure::failed(
-            ErrorCode::InvalidStand,
+        return Err(invalid(
+            name,
             format_args!("[{}] is not a table; correct it", entry.section),
-        )
-        .at(name));
+        ));
     };
     let others: &[&str] = match entry.key {
         key if CONSTANTS.contains(&key) => &MODAL,
@@ -322,15 +316,14 @@ fn put(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<(), Fail
         _ => &[],
     };
     if let Some(other) = others.iter().find(|other| table.contains_key(other)) {
-        return Err(Failure::failed(
-            ErrorCode::InvalidStand,
+        return Err(invalid(
+            name,
             format_args!(
                 "[{}] has {other}, so that {} cannot be written beside it; remove it, or write to \
              another file",
                 entry.section, entry.key
             ),
-        )
-        .at(name));
+        ));
     }
     match table.get_mut(entry.key) {
         Some(item) => {
@@ -347,6 +340,11 @@ fn put(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<(), Fail
         }
     }
     Ok(())
+}
+
+/// A failure due to a stand file of this name.
+fn invalid(name: &str, message: impl std::fmt::Display) -> Failure {
+    Failure::failed(ErrorCode::InvalidStand, message).at(name)
 }
 
 /// Nine significant digits, more than any record can determine.
@@ -385,13 +383,8 @@ pub fn declared(
     key: &str,
     kind: Kind,
 ) -> Result<Option<(f64, Option<f64>)>, Failure> {
-    let wrong = |error: &dyn std::fmt::Display| {
-        Failure::failed(
-            ErrorCode::InvalidStand,
-            format_args!("[mechanics] {key}: {error}"),
-        )
-        .at(name)
-    };
+    let wrong =
+        |error: &dyn std::fmt::Display| invalid(name, format_args!("[mechanics] {key}: {error}"));
     let document = text
         .parse::<DocumentMut>()
         .map_err(|error| wrong(&error.message()))?;
