@@ -47,6 +47,17 @@ pub(crate) struct RecordFigures {
     pub(crate) noise_rms: Option<f64>,
 }
 
+impl RecordFigures {
+    /// Those of a record alone.
+    pub(crate) fn of(samples: usize, rate_hz: f64) -> Self {
+        Self {
+            samples: Some(samples),
+            rate_hz: Some(rate_hz),
+            ..Self::default()
+        }
+    }
+}
+
 /// Results of a verb for one record. The outputs are complete; [`Made::publish`] gives them their names.
 pub(crate) struct Made {
     pub(crate) outputs: Vec<Output>,

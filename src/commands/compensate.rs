@@ -23,8 +23,8 @@ use self::band::{BandReport, Wanted};
 pub(super) use self::report::CompensateReport;
 use self::report::{NoiseAt, NoiseReport};
 use self::sink::Sink;
-use super::{judged, unit_text, warned};
-use crate::cli::{self, OneChannel};
+use super::{made, unit_text};
+use crate::cli;
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::Motion;
 use crate::inverse::ChainInverse;
@@ -102,18 +102,12 @@ pub fn work(args: &cli::Compensate) -> Result<Made, Failure> {
     }
     let beside = plot.into_iter().chain(html);
     let outputs = beside.chain([sink.finish(args, &report)?]).collect();
+    let is_lossy = seen.summary.lost.is_some();
     Ok(Made {
-        outputs,
         document: args.json.then(|| report.document(true)),
         notes: report.text(),
-        talk: warned(&report.warnings),
-        outcome: judged(
-            &report.warnings,
-            seen.summary.lost.is_some(),
-            &args.strictness,
-        ),
         figures: report.figures(),
-        warnings: report.warnings,
+        ..made(outputs, report.warnings, is_lossy, &args.strictness)
     })
 }
 
@@ -121,7 +115,7 @@ pub fn work(args: &cli::Compensate) -> Result<Made, Failure> {
 fn refuse_derivative(stand: &Stand) -> Result<(), Failure> {
     match stand.mechanics()?.measures {
         Motion::Displacement => Ok(()),
-        other => Err(Failure::failed(
+        other => Err(stand.failed(
             ErrorCode::NotInvertible,
             format_args!(
                 "[mechanics] measures is {}, which does not show a constant torque, so torque over time cannot be \
@@ -129,8 +123,7 @@ fn refuse_derivative(stand: &Stand) -> Result<(), Failure> {
                  torque",
                 other.name()
             ),
-        )
-        .at(&stand.file)),
+        )),
     }
 }
 
@@ -138,11 +131,9 @@ impl Opened {
     fn new(args: &cli::Compensate) -> Result<Self, Failure> {
         let stand = stand::read(&args.stand)?;
         refuse_derivative(&stand)?;
-        let OneChannel {
-            choice, reading, ..
-        } = &args.record;
-        let input = Input::of(args.record.input());
-        let stream = ChannelStream::open(&input, choice, reading)?;
+        let record = &args.record;
+        let input = Input::of(record.input());
+        let stream = ChannelStream::open(&input, &record.choice, &record.reading)?;
         if stream.is_compensated {
             return Err(already_compensated(&stream.source, &stream.name));
         }

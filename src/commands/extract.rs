@@ -2,9 +2,9 @@
 
 use torqcomp_decimal::Text;
 
+use super::made;
 use super::rows::{self, Rows, Times};
-use super::{judged, warned};
-use crate::cli::{Extract, OneChannel};
+use crate::cli::Extract;
 use crate::failure::Failure;
 use crate::io::output::Output;
 use crate::io::{COMPENSATED, Input, Reading, names_compensated};
@@ -17,15 +17,12 @@ use crate::recording::{Block, ChannelStream, StreamSummary, UniformStream};
 /// # Errors
 /// If the work cannot be done.
 pub fn work(args: &Extract) -> Result<Made, Failure> {
-    let OneChannel {
-        choice, reading, ..
-    } = &args.record;
     let reading = Reading {
         any_steps: true,
-        ..reading.clone()
+        ..args.record.reading.clone()
     };
     let input = args.record.input();
-    let stream = ChannelStream::open(&Input::of(input), choice, &reading)?;
+    let stream = ChannelStream::open(&Input::of(input), &args.record.choice, &reading)?;
     let mut output = args.result.open(&[input])?;
     output.write(&heading(&stream))?;
     let said = format!(
@@ -41,20 +38,16 @@ pub fn work(args: &Extract) -> Result<Made, Failure> {
     } else {
         write_as_it_is(args, stream, &mut output)?
     };
-    let mut warnings: Vec<_> = summary.lost.iter().cloned().collect();
-    warnings.extend(summary.warnings);
+    let is_lossy = summary.lost.is_some();
     Ok(Made {
-        outputs: vec![output],
-        document: None,
         notes: said,
-        talk: warned(&warnings),
-        outcome: judged(&warnings, summary.lost.is_some(), &args.strictness),
-        figures: RecordFigures {
-            samples: Some(samples),
-            rate_hz: Some(rate_hz),
-            ..RecordFigures::default()
-        },
-        warnings,
+        figures: RecordFigures::of(samples, rate_hz),
+        ..made(
+            vec![output],
+            summary.all_warnings(),
+            is_lossy,
+            &args.strictness,
+        )
     })
 }
 

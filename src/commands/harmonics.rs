@@ -20,8 +20,8 @@ use torqcomp_dsp::quality::streamed::StreamedFaults;
 use torqcomp_dsp::store::SampleStore;
 use torqcomp_model::{InverseUncertainty, UnitSystem};
 
-use super::{judged, unit_text, warned};
-use crate::cli::{self, OneChannel};
+use super::{made, unit_text};
+use crate::cli;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::{COMPENSATED, Input};
 use crate::outcome::{Made, RecordFigures};
@@ -122,11 +122,8 @@ struct ComponentTorque {
 /// If the work cannot be done.
 pub fn work(args: &cli::Harmonics) -> Result<Made, Failure> {
     let stand = args.stand.as_deref().map(stand::read).transpose()?;
-    let OneChannel {
-        choice, reading, ..
-    } = &args.record;
-    let input = args.record.input();
-    let stream = ChannelStream::open(&Input::of(input), choice, reading)?;
+    let (taken, input) = (&args.record, args.record.input());
+    let stream = ChannelStream::open(&Input::of(input), &taken.choice, &taken.reading)?;
     let way = WayBack::new(&stream, stand, args.units.into())?;
     let inputs = [Some(input), args.stand.as_deref()];
     let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
@@ -140,17 +137,8 @@ pub fn work(args: &cli::Harmonics) -> Result<Made, Failure> {
     output.write(report.document(args.json).as_bytes())?;
     let is_lossy = record.summary.lost.is_some();
     Ok(Made {
-        outputs: vec![output],
-        document: None,
-        notes: String::new(),
-        talk: warned(&report.warnings),
-        outcome: judged(&report.warnings, is_lossy, &args.strictness),
-        figures: RecordFigures {
-            samples: Some(report.samples),
-            rate_hz: Some(report.rate_hz),
-            ..RecordFigures::default()
-        },
-        warnings: report.warnings,
+        figures: RecordFigures::of(report.samples, report.rate_hz),
+        ..made(vec![output], report.warnings, is_lossy, &args.strictness)
     })
 }
 
@@ -210,9 +198,9 @@ impl WayBack {
 /// Warnings, first about losses, then about the record, its stand and its channel.
 fn of_inputs(way: &WayBack, record: &UniformRecord) -> Vec<Warning> {
     let of_stand = way.stand.iter().flat_map(|(stand, _)| &stand.warnings);
-    let lost = record.summary.lost.iter();
-    let said = lost.chain(&record.summary.warnings).chain(of_stand);
-    said.chain(&way.chain.warnings).cloned().collect()
+    let further = of_stand.chain(&way.chain.warnings).cloned();
+    let said = record.summary.all_warnings().into_iter();
+    said.chain(further).collect()
 }
 
 /// The reference time of the phases, and the time of the first sample after it in s. Far from zero, phases at zero

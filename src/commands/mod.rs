@@ -23,7 +23,7 @@ use crate::cli::{Cli, Strictness, Verb};
 use crate::failure::Failure;
 use crate::io::output::Output;
 use crate::log;
-use crate::outcome::Outcome;
+use crate::outcome::{Made, Outcome, RecordFigures};
 use crate::print::{self, Report};
 use crate::stand::{Calibration, TransducerSignal};
 use crate::unit::NamedUnit;
@@ -63,6 +63,19 @@ fn conclude(warnings: &[Warning], lost: bool, strictness: &Strictness) -> Outcom
     print::say(&warned(warnings));
     log::warnings(None, warnings);
     judged(warnings, lost, strictness)
+}
+
+/// The outputs of a verb for one record, with its warnings, losses included, for people and for the exit code.
+fn made(outputs: Vec<Output>, warnings: Vec<Warning>, lost: bool, strictness: &Strictness) -> Made {
+    Made {
+        outputs,
+        document: None,
+        notes: String::new(),
+        talk: warned(&warnings),
+        outcome: judged(&warnings, lost, strictness),
+        figures: RecordFigures::default(),
+        warnings,
+    }
 }
 
 /// Warnings for people, a line each.

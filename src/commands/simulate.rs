@@ -5,7 +5,7 @@ use serde::Serialize;
 use torqcomp_model::simulate::{Between, Pieces, steady_answer};
 use torqcomp_model::{Chain, Unit, UnitSystem};
 
-use super::{judged, rows, warned};
+use super::rows;
 use crate::cli;
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::ShowPath;
@@ -113,22 +113,14 @@ pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
 
 /// The written record and its report.
 fn made(args: &cli::Simulate, report: SimulateReport, output: Output, is_lossy: bool) -> Made {
-    let notes = match args.json {
-        true => String::new(),
-        false => report.text(),
-    };
     Made {
-        outputs: vec![output],
         document: args.json.then(|| report.document(true)),
-        notes,
-        talk: warned(&report.warnings),
-        outcome: judged(&report.warnings, is_lossy, &args.strictness),
-        figures: RecordFigures {
-            samples: Some(report.samples),
-            rate_hz: Some(report.rate_hz),
-            ..RecordFigures::default()
+        notes: match args.json {
+            true => String::new(),
+            false => report.text(),
         },
-        warnings: report.warnings,
+        figures: RecordFigures::of(report.samples, report.rate_hz),
+        ..super::made(vec![output], report.warnings, is_lossy, &args.strictness)
     }
 }
 
@@ -267,7 +259,7 @@ impl AppliedInput {
         if let Some(ended) = stream.take() {
             let (summary, done) = ended.finish(samples)?;
             self.is_lossy = summary.lost.is_some();
-            self.warnings = summary.lost.into_iter().chain(summary.warnings).collect();
+            self.warnings = summary.all_warnings();
             let was = ["was", "are not uniform"];
             let told = done.map(|done| resampled(&self.name, was, self.axis, &done));
             self.warnings.extend(told);

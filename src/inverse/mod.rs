@@ -227,7 +227,7 @@ fn refuse_bent_coupling(stand: &Stand, chain: &Chain) -> Result<(), Failure> {
         |link: &&Link| link.stage < Stage::Chain && matches!(link.action, Action::Distortion(_));
     let coupled = links.iter().find(|link| link.is_feedthrough());
     match (coupled, links.iter().find(is_bent)) {
-        (Some(coupled), Some(curve)) => Err(Failure::failed(
+        (Some(coupled), Some(curve)) => Err(stand.failed(
             ErrorCode::NotInvertible,
             format_args!(
                 "\"{}\" bypasses the stand, and \"{}\" distorts its response; the two cannot be inverted together; \
@@ -235,8 +235,7 @@ fn refuse_bent_coupling(stand: &Stand, chain: &Chain) -> Result<(), Failure> {
                 coupled.effect,
                 curve.effect
             ),
-        )
-        .at(&stand.file)),
+        )),
         _ => Ok(()),
     }
 }

@@ -71,6 +71,13 @@ pub(crate) struct StreamSummary {
     pub(crate) warnings: Vec<Warning>,
 }
 
+impl StreamSummary {
+    /// Losses, and further warnings.
+    pub(crate) fn all_warnings(&self) -> Vec<Warning> {
+        self.lost.iter().chain(&self.warnings).cloned().collect()
+    }
+}
+
 impl StreamValidator {
     pub(super) fn new(
         source: String,

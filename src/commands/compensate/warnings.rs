@@ -25,8 +25,7 @@ const NOISY_FRACTION: f64 = 0.5;
 
 /// Adds the warnings to an otherwise complete report.
 pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Traces>) {
-    let mut more: Vec<Warning> = seen.summary.lost.iter().cloned().collect();
-    more.extend(seen.summary.warnings.clone());
+    let mut more = seen.summary.all_warnings();
     match &report.noise.record {
         Some(noise) => more.extend(of_noise(noise, report)),
         None => more.extend(of_unknown_noise(report)),

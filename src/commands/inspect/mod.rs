@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use self::content::Content;
 pub(super) use self::report::InspectReport;
 use self::report::{ChannelWarning, Inspected};
-use super::{Outcome, judged, many};
+use super::{Outcome, made, many};
 use crate::batch;
 use crate::cli::Inspect;
 use crate::failure::{ErrorCode, Failure};
@@ -142,13 +142,11 @@ fn finish(
     }
     let warning = |w: &ChannelWarning| Warning::new(w.code, w.message.clone());
     let warnings: Vec<Warning> = report.all_warnings().map(warning).collect();
+    let outputs = plot.into_iter().chain([output]).collect();
     Ok(Made {
-        outputs: plot.into_iter().chain([output]).collect(),
-        document: None,
-        notes: String::new(),
+        // The report has them.
         talk: String::new(),
-        outcome: judged(&warnings, report.is_lossy(), &args.strictness),
         figures: report.figures(),
-        warnings,
+        ..made(outputs, warnings, report.is_lossy(), &args.strictness)
     })
 }
