@@ -13,7 +13,7 @@ use std::collections::HashMap;
 use torqcomp_dsp::quality::clipping::Clipping;
 use torqcomp_dsp::quality::mains::MainsLine;
 
-use crate::recording::{AlignedChannel, AlignedChannels, Channel, TimeAxis};
+use crate::recording::{AlignedChannels, Channel, TimeAxis};
 use crate::warning::Warning;
 
 pub use samples::{Findings, clipped_ends};
@@ -54,7 +54,7 @@ fn of_findings(name: &str, unit: &str, mut findings: Findings, axis: &TimeAxis) 
 /// Warnings about clipping of channels sampled together.
 pub(crate) fn clipped(aligned: &AlignedChannels) -> Vec<Warning> {
     let axis = TimeAxis::uniform(aligned.rate_hz, aligned.start);
-    let of_channel = |channel: &AlignedChannel| {
+    let of_channel = |channel: &Channel| {
         let unit = channel.unit.as_ref().map_or("", |unit| &unit.text);
         let found = Clipping::of(&channel.samples)?;
         Some(clipped_ends(&channel.name, unit, &found, &axis))

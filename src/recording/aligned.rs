@@ -7,11 +7,10 @@ use torqcomp_dsp::resample::{Resampled, Resampler};
 use super::memory_stream::{check_cells, check_size};
 use super::moment::Moment;
 use super::stamps::check_resampled;
-use super::{Recording, Selection, typical_step};
+use super::{Channel, Recording, Selection, typical_step};
 use crate::failure::{ErrorCode, Failure};
-use crate::io::{ChannelChoice, Input, Reading, already_compensated};
+use crate::io::{ChannelChoice, Input, Reading};
 use crate::print;
-use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
 /// Largest difference of the stamps of two channels that count as equal, in steps.
@@ -20,42 +19,6 @@ const SAME_STAMP: f64 = 0.05;
 const SIMILAR: f64 = 0.05;
 /// Relative difference of rates that count as equal.
 const SAME_RATE: f64 = 1e-6;
-
-/// A channel.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct AlignedChannel {
-    pub(crate) name: String,
-    /// Its samples, in the unit of the file.
-    pub(crate) samples: Vec<f64>,
-    /// That unit, if known.
-    pub(crate) unit: Option<NamedUnit>,
-    /// That unit as written in the file, known or not.
-    pub(crate) unit_text: Option<String>,
-    /// Whether it is marked as a result of `compensate`.
-    is_compensated: bool,
-}
-
-impl AlignedChannel {
-    /// Rejects a result of `compensate` where the response of a stand is required.
-    ///
-    /// # Errors
-    /// If it is marked as one.
-    pub(crate) fn must_be_as_recorded(&self, source: &str) -> Result<(), Failure> {
-        match self.is_compensated {
-            true => Err(already_compensated(source, &self.name)),
-            false => Ok(()),
-        }
-    }
-
-    /// The channel in the form required by a stand.
-    pub(crate) fn channel(&self) -> RecordedChannel<'_> {
-        RecordedChannel {
-            name: &self.name,
-            unit: self.unit.as_ref(),
-            unit_text: self.unit_text.as_deref(),
-        }
-    }
-}
 
 /// Channels sampled at the same moments.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,8 +31,8 @@ pub(crate) struct AlignedChannels {
     pub(crate) rate_std_hz: Option<f64>,
     /// Time of the first sample.
     pub(crate) start: Moment,
-    /// The channels, in the order requested.
-    pub(crate) channels: Vec<AlignedChannel>,
+    /// The channels on that axis, in the order requested, in the unit of the file or the given one.
+    pub(crate) channels: Vec<Channel>,
     /// Warnings about the file and the alignment of its channels; losses come first.
     pub(crate) warnings: Vec<Warning>,
     /// Whether something in the file was lost.
@@ -286,32 +249,32 @@ fn note_worst(worst: &mut Resampled, done: &Resampled) {
     worst.largest_jitter = worst.largest_jitter.max(done.largest_jitter);
 }
 
-fn aligned_channel(selection: &Selection, samples: Vec<f64>) -> AlignedChannel {
-    AlignedChannel {
-        name: selection.channel.name.clone(),
+/// A selected channel with samples on another axis.
+fn aligned_channel(selection: &Selection, samples: Vec<f64>) -> Channel {
+    let channel = selection.channel;
+    Channel {
+        name: channel.name.clone(),
+        heading: channel.heading.clone(),
         samples,
         unit: selection.unit.clone(),
-        unit_text: selection.channel.unit_text.clone(),
-        is_compensated: selection.channel.is_compensated,
+        unit_text: channel.unit_text.clone(),
+        is_compensated: channel.is_compensated,
+        ..Channel::default()
     }
 }
 
 /// The channels with their first samples, which are moved out of the recording, as they may be most of
 /// it.
-fn filled(
-    recording: &mut Recording,
-    empty: Vec<(usize, AlignedChannel)>,
-    count: usize,
-) -> Vec<AlignedChannel> {
+fn filled(recording: &mut Recording, empty: Vec<(usize, Channel)>, count: usize) -> Vec<Channel> {
     let places: Vec<usize> = empty.iter().map(|(place, _)| *place).collect();
-    let fill = |(i, (place, channel)): (usize, (usize, AlignedChannel))| {
+    let fill = |(i, (place, channel)): (usize, (usize, Channel))| {
         let samples = &mut recording.channels[place].samples;
         let mut samples = match places[i + 1..].contains(&place) {
             true => samples.clone(),
             false => std::mem::take(samples),
         };
         samples.truncate(count);
-        AlignedChannel { samples, ..channel }
+        Channel { samples, ..channel }
     };
     empty.into_iter().enumerate().map(fill).collect()
 }

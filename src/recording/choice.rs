@@ -11,9 +11,9 @@ use super::moment::Moment;
 use super::text::CELLS_WITH_UNITS;
 use super::{Channel, Hole, HoleKind, RateFrom, Recording, check_holes, check_size, formats};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
-use crate::io::{ChannelChoice, Reading};
+use crate::io::{ChannelChoice, Reading, already_compensated};
 use crate::print::{enumeration, list, plural};
-use crate::unit::NamedUnit;
+use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
 /// Identification of a channel.
@@ -408,6 +408,26 @@ impl Recording {
 }
 
 impl Channel {
+    /// The channel in the form required by a stand.
+    pub(crate) fn recorded(&self) -> RecordedChannel<'_> {
+        RecordedChannel {
+            name: &self.name,
+            unit: self.unit.as_ref(),
+            unit_text: self.unit_text.as_deref(),
+        }
+    }
+
+    /// Rejects a result of `compensate` where the response of a stand is required.
+    ///
+    /// # Errors
+    /// If it is marked as one.
+    pub(crate) fn must_be_as_recorded(&self, source: &str) -> Result<(), Failure> {
+        match self.is_compensated {
+            true => Err(already_compensated(source, &self.name)),
+            false => Ok(()),
+        }
+    }
+
     fn label(&self) -> Label<'_> {
         Label {
             heading: &self.heading,

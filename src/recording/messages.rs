@@ -58,11 +58,9 @@ pub(super) fn read(
             unit: unit(&selected),
             unit_text: selected.unit.as_ref().map(|found| found.unit.clone()),
             samples,
-            holes: Vec::new(),
             axis,
-            segment: None,
-            filled: Vec::new(),
             is_compensated: selected.is_compensated,
+            ..Channel::default()
         });
     }
     if let Some(range) = &reading.range {

@@ -37,7 +37,7 @@ use crate::io::{ChannelChoice, HEAD, Input, Reading};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
-pub(crate) use aligned::{AlignedChannel, AlignedChannels, resampled};
+pub(crate) use aligned::{AlignedChannels, resampled};
 pub use all_samples::AllSamples;
 pub(crate) use axis::without_rounding;
 pub use axis::{REVERSED, RateFrom, TimeAxis, falls, seconds_assumed, typical_step};
@@ -55,7 +55,7 @@ pub(crate) use uniform::{UniformRecord, UniformStream};
 pub(crate) use validator::{StreamSummary, StreamValidator};
 
 /// A file's content.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Recording {
     /// Name of the file, for messages.
     pub source: String,
@@ -83,12 +83,7 @@ impl Recording {
         Self {
             source,
             format,
-            dialect: String::new(),
-            details: Vec::new(),
-            channels: Vec::new(),
-            segments: Vec::new(),
-            warnings: Vec::new(),
-            lost: None,
+            ..Self::default()
         }
     }
 }
@@ -106,7 +101,7 @@ pub struct Segment {
 }
 
 /// One channel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Channel {
     /// Its name, without the unit.
     pub name: String,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use toml_edit::Document;
+use toml_edit::{Document, Table};
 use torqcomp_model::Unit;
 
 use super::drawing::{beam, friction, part, unusual_modulus};
@@ -59,6 +59,8 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
     })?;
     let top = Section::new(&source, "", document.as_table(), Some(0));
     check_schema(&top)?;
+    let nothing = Table::new();
+    let plain_recorder = Section::new(&source, "[recorder]", &nothing, None);
     let mut stand = Stand {
         name: top.text("name")?.unwrap_or("unnamed stand").to_owned(),
         file: name.to_owned(),
@@ -73,7 +75,7 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
         friction: one(&top, "friction", friction)?,
         gage: one(&top, "gage", gage)?,
         bridge: one(&top, "bridge", bridge)?,
-        recorder: recorder(top.section("recorder")?.as_ref())?,
+        recorder: recorder(&top.section("recorder")?.unwrap_or(plain_recorder))?,
         effects: Vec::new(),
         diagnosed: Diagnosed::default(),
         warnings: Vec::new(),

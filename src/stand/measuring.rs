@@ -144,26 +144,7 @@ fn leads(section: &Section) -> Result<Leads, Failure> {
     }
 }
 
-pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failure> {
-    let Some(section) = section else {
-        let recorder = Recorder::new(1.0, None, 0.0).expect("a plain recorder is a recorder");
-        return Ok(RecorderData {
-            recorder,
-            low_pass: None,
-            cutoff_std_hz: None,
-            delay_std_s: None,
-            has_gain: false,
-            is_order_assumed: false,
-            gain_relative_std: None,
-            input_resistance_ohm: None,
-            zero: None,
-        });
-    };
-    let optional = |key, kind| {
-        section
-            .positive_if_any(key, kind)
-            .map(|e| e.map(|e| e.value()))
-    };
+pub(super) fn recorder(section: &Section) -> Result<RecorderData, Failure> {
     let given = gain(section)?;
     let cutoff = section.positive_if_any("low_pass", Kind::Frequency)?;
     let order = section.whole("low_pass_order")?;
@@ -184,7 +165,7 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
         delay_s,
     )
     .map_err(|error| section.fail("", error))?;
-    let input_resistance_ohm = optional("input_resistance", Kind::Resistance)?;
+    let input_resistance = section.positive_if_any("input_resistance", Kind::Resistance)?;
     let zero = TransducerSignal::read(section, "zero")?;
     section.finish()?;
     Ok(RecorderData {
@@ -195,7 +176,7 @@ pub(super) fn recorder(section: Option<&Section>) -> Result<RecorderData, Failur
         has_gain: given.is_some(),
         is_order_assumed: low_pass.is_some() && order.is_none(),
         gain_relative_std: given.and_then(|gain| gain.relative_std()),
-        input_resistance_ohm,
+        input_resistance_ohm: input_resistance.map(|ohm| ohm.value()),
         zero,
     })
 }

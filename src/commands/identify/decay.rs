@@ -15,7 +15,7 @@ use crate::failure::Failure;
 use crate::file_name::{self, ShowPath};
 use crate::identify::decay::{DecayOptions, Ringing, identify};
 use crate::identify::{Identification, ModalPole};
-use crate::io::{Input, Reading, already_compensated};
+use crate::io::{Input, Reading};
 use crate::quality::{self, TimeFindings};
 use crate::recording::{AlignedChannels, Channel, Recording, check_cells, is_uniform};
 use crate::stand::update::Entry;
@@ -116,13 +116,7 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
     let place = recording
         .place(&args.choice)
         .map_err(|f| f.at(input.shown()))?;
-    let chosen = &recording.channels[place];
-    if chosen.is_compensated {
-        return Err(already_compensated(
-            &input.shown().to_string(),
-            &chosen.name,
-        ));
-    }
+    recording.channels[place].must_be_as_recorded(&input.shown().to_string())?;
     if resample {
         let aligned = AlignedChannels::of(recording, choices, &args.reading);
         return Ok(resampled(

@@ -13,7 +13,7 @@ use crate::identify::response::{Driven, RATIO, ResponseOptions, identify};
 use crate::identify::{Identification, Motion, NamedEstimate, gravity_hint};
 use crate::io::{ChannelChoice, Input};
 use crate::quality;
-use crate::recording::{AlignedChannel, AlignedChannels};
+use crate::recording::{AlignedChannels, Channel};
 use crate::stand::TransducerSignal;
 use crate::stand::update::{self, Entry};
 use crate::unit::NamedUnit;
@@ -116,7 +116,7 @@ const NOT_AT_REST: &str = "the static response of these modes is zero, but a sta
     another --band";
 
 /// Converts a force at a radius to a torque.
-fn to_torque(force: &mut AlignedChannel, radius: &str) -> Result<(), Failure> {
+fn to_torque(force: &mut Channel, radius: &str) -> Result<(), Failure> {
     let radius_m = quantity("--radius", radius, Kind::Length)?;
     if radius_m <= 0.0 {
         return Err(Failure::usage(
@@ -124,7 +124,7 @@ fn to_torque(force: &mut AlignedChannel, radius: &str) -> Result<(), Failure> {
             format_args!("--radius {radius}: it must be greater than 0"),
         ));
     }
-    let unit = unit_or(force.channel(), "--applied-unit")?;
+    let unit = unit_or(force.recorded(), "--applied-unit")?;
     if unit.unit.dimension() != FORCE {
         return Err(Failure::usage(
             ErrorCode::ConflictingArguments,

@@ -12,7 +12,7 @@ use crate::identify::{Identification, Motion, gravity_hint};
 use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::quality;
-use crate::recording::{AlignedChannel, AlignedChannels};
+use crate::recording::{AlignedChannels, Channel};
 use crate::stand::update::Entry;
 use crate::unit::RecordedChannel;
 
@@ -26,7 +26,7 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
     let mut read = AlignedChannels::read(&Input::of(&args.input), &choices, &args.reading)?;
     let clipped = quality::clipped(&read);
     let (motion, torque) = (&read.channels[0], &read.channels[1]);
-    let motion_unit = unit_or(motion.channel(), "--motion-unit")?;
+    let motion_unit = unit_or(motion.recorded(), "--motion-unit")?;
     let (kind, turning) = Motion::of(motion_unit.unit.dimension()).ok_or_else(|| {
         Failure::failed(
             ErrorCode::UnitUnsuitable,
@@ -99,11 +99,11 @@ fn entries(args: &Runup, result: &Identification) -> Result<Vec<Entry>, Failure>
 }
 
 /// SI units of torque (rotation) or force per unit of the channel.
-fn effort_factor(args: &Runup, torque: &AlignedChannel, turning: bool) -> Result<f64, Failure> {
+fn effort_factor(args: &Runup, torque: &Channel, turning: bool) -> Result<f64, Failure> {
     let (factor, dimension) = match &args.torque_factor {
-        Some(text) => factor_of(text, torque.channel())?,
+        Some(text) => factor_of(text, torque.recorded())?,
         None => {
-            let unit = unit_or(torque.channel(), "--torque-unit")?;
+            let unit = unit_or(torque.recorded(), "--torque-unit")?;
             (unit.unit.factor(), unit.unit.dimension())
         }
     };

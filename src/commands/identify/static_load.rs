@@ -237,9 +237,8 @@ fn column(
     warnings.extend(warning);
     let flag = choice.flags.unit.unwrap_or_default();
     let named = RecordedChannel {
-        name: &channel.name,
         unit: unit.as_ref(),
-        unit_text: channel.unit_text.as_deref(),
+        ..channel.recorded()
     };
     let unit = unit_or(named, flag)?;
     Ok((channel.samples.clone(), unit))

@@ -231,11 +231,9 @@ fn channel(
         unit: unit.as_deref().and_then(NamedUnit::parse),
         unit_text: unit,
         samples,
-        holes: Vec::new(),
         axis,
-        segment: None,
-        filled: Vec::new(),
         is_compensated: selected.is_compensated,
+        ..Channel::default()
     };
     (channel, whole)
 }

@@ -178,9 +178,8 @@ fn channel(name: &str, unit_text: Option<&str>, samples: Vec<f64>, axis: TimeAxi
         samples,
         holes,
         axis,
-        segment: None,
-        filled: Vec::new(),
         is_compensated: names_compensated(name),
+        ..Channel::default()
     }
 }
 

@@ -424,8 +424,7 @@ pub fn channel(field: &Field, mut column: Column, mut axis: TimeAxis) -> Channel
         samples: column.values,
         holes: column.holes,
         axis,
-        segment: None,
-        filled: Vec::new(),
         is_compensated: names_compensated(&field.heading),
+        ..Channel::default()
     }
 }
