@@ -1,9 +1,9 @@
 //! Common interface to the message encodings.
 
-use std::fmt;
 use std::sync::Arc;
 
 use prost_reflect::MessageDescriptor;
+use thiserror::Error;
 
 use super::cdr;
 use super::json;
@@ -60,11 +60,13 @@ impl Reading {
 }
 
 /// Reason why a message gives no value.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum Damage {
     /// It ends before the field.
+    #[error("the message ends before the field")]
     Short,
     /// The list is shorter.
+    #[error("there is no item [{index}], the list has {count}")]
     NoItem {
         /// Requested item.
         index: i64,
@@ -72,6 +74,7 @@ pub enum Damage {
         count: u64,
     },
     /// No item has that name.
+    #[error("no item is called \"{name}\"{}", known(.name, .there))]
     NoName {
         /// Requested name.
         name: String,
@@ -79,44 +82,27 @@ pub enum Damage {
         there: Vec<String>,
     },
     /// Unknown encapsulation of the message.
+    #[error(
+        "its encapsulation 0x{0:02x} is not supported; expected plain CDR (0x00, 0x01) or plain XCDR2 (0x06, 0x07, \
+         0x10, 0x11)"
+    )]
     Encapsulation(u8),
     /// The field is not set.
+    #[error("the field is not set")]
     Absent,
     /// The bytes are not a message in this encoding.
+    #[error("the message cannot be read: {0}")]
     Malformed(String),
 }
 
-impl fmt::Display for Damage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Short => f.write_str("the message ends before the field"),
-            Self::NoItem { index, count } => {
-                write!(f, "there is no item [{index}], the list has {count}")
-            }
-            Self::NoName { name, there } => {
-                let known = there.iter().map(String::as_str);
-                write!(
-                    f,
-                    "no item is called \"{name}\"{}",
-                    did_you_mean(name, known)
-                )?;
-                let shown = &there[..there.len().min(SHOWN)];
-                match (there.is_empty(), there.len() > SHOWN) {
-                    (true, _) => f.write_str("; none has a name"),
-                    (false, more) => {
-                        write!(f, "; there are: {}", shown.join(", "))?;
-                        f.write_str(if more { " and more" } else { "" })
-                    }
-                }
-            }
-            Self::Encapsulation(kind) => write!(
-                f,
-                "its encapsulation 0x{kind:02x} is not supported; expected plain CDR (0x00, 0x01) \
-                 or plain XCDR2 (0x06, 0x07, 0x10, 0x11)"
-            ),
-            Self::Absent => f.write_str("the field is not set"),
-            Self::Malformed(why) => write!(f, "the message cannot be read: {why}"),
-        }
+/// The names after the text that none of them is the requested one.
+fn known(name: &str, there: &[String]) -> String {
+    let meant = did_you_mean(name, there.iter().map(String::as_str));
+    let shown = there[..there.len().min(SHOWN)].join(", ");
+    match there.len() {
+        0 => format!("{meant}; none has a name"),
+        ..=SHOWN => format!("{meant}; there are: {shown}"),
+        _ => format!("{meant}; there are: {shown} and more"),
     }
 }
 

@@ -3,11 +3,11 @@
 //! The bytes are decompressed into a buffer that grows with the actual output; a long chunk is read piece by
 //! piece.
 
-use std::fmt;
 use std::io::{self, BufRead, Read, Write};
 
 use lz4_flex::frame::{BlockMode, BlockSize, FrameDecoder, FrameEncoder, FrameInfo};
 use mcap::records::ChunkHeader;
+use thiserror::Error;
 
 use super::fields::RecordFields;
 
@@ -36,17 +36,22 @@ pub(crate) fn chunk_front(body: &[u8]) -> Option<(ChunkHeader, &[u8])> {
 }
 
 /// A fault of a chunk.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub(crate) enum ChunkError {
     /// Unreadable header.
+    #[error("its header cannot be read")]
     Head,
     /// Unknown compression.
+    #[error("unknown compression \"{0}\"; expected \"zstd\", \"lz4\" or none")]
     Compression(String),
     /// Decompressed size above [`LARGEST`], actual or claimed.
+    #[error("it decompresses to {0} bytes, the maximum is {LARGEST}")]
     TooLarge(u64),
     /// Damaged compressed data.
+    #[error("it cannot be decompressed ({0})")]
     Damaged(String),
     /// Decompressed length differs from the claimed one.
+    #[error("it decompresses to {found} bytes instead of {told}")]
     Length {
         /// Claimed length.
         told: u64,
@@ -54,38 +59,13 @@ pub(crate) enum ChunkError {
         found: u64,
     },
     /// Checksum mismatch.
+    #[error("its CRC is {found:08x} instead of {told:08x}: the bytes are damaged")]
     Crc {
         /// Stored checksum.
         told: u32,
         /// Computed checksum.
         found: u32,
     },
-}
-
-impl fmt::Display for ChunkError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Head => f.write_str("its header cannot be read"),
-            Self::Compression(name) => write!(
-                f,
-                "unknown compression \"{name}\"; expected \"zstd\", \"lz4\" or none"
-            ),
-            Self::TooLarge(size) => {
-                write!(
-                    f,
-                    "it decompresses to {size} bytes, the maximum is {LARGEST}"
-                )
-            }
-            Self::Damaged(why) => write!(f, "it cannot be decompressed ({why})"),
-            Self::Length { told, found } => {
-                write!(f, "it decompresses to {found} bytes instead of {told}")
-            }
-            Self::Crc { told, found } => write!(
-                f,
-                "its CRC is {found:08x} instead of {told:08x}: the bytes are damaged"
-            ),
-        }
-    }
 }
 
 /// Location of a chunk's records after decompression.

@@ -1,10 +1,10 @@
 //! Sequential top-level records of a file, with chunks as stored.
 
-use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use mcap::MAGIC;
 use mcap::records::op;
+use thiserror::Error;
 
 use super::chunk::{self, ChunkError};
 use super::input::CountedInput;
@@ -42,9 +42,12 @@ pub(crate) fn longest(op: u8) -> u64 {
 }
 
 /// Lost data.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub(crate) enum Loss {
     /// The file ends before its end record.
+    #[error(
+        "the file ends {what}, without its end record; everything complete up to byte {at} was read"
+    )]
     Truncated {
         /// Offset after the last complete record.
         at: u64,
@@ -52,6 +55,7 @@ pub(crate) enum Loss {
         what: &'static str,
     },
     /// A damaged chunk that was dropped.
+    #[error("the chunk at byte {at} was skipped: {why}{}", log_times(*.span_ns))]
     Chunk {
         /// Its offset.
         at: u64,
@@ -60,11 +64,15 @@ pub(crate) enum Loss {
         span_ns: Option<(u64, u64)>,
     },
     /// A record within a chunk that runs past its end.
+    #[error(
+        "a record in the chunk at byte {at} runs past the end of the chunk; the rest of the chunk was skipped"
+    )]
     Overrun {
         /// Offset of the chunk.
         at: u64,
     },
     /// A record of a kind that does not exist, or not in this place.
+    #[error("{}", unknown(*.at, *.op, *.is_nested))]
     Unknown {
         /// Offset of the record, or of the chunk that contains it.
         at: u64,
@@ -73,38 +81,51 @@ pub(crate) enum Loss {
         is_nested: bool,
     },
     /// An unreadable schema, channel or summary entry.
+    #[error("a record at byte {at} (opcode 0x{op:02x}) cannot be read: what it declares is lost")]
     Unreadable {
         /// Offset of the record, or of the chunk that contains it.
         at: u64,
         op: u8,
     },
     /// A message index that does not follow a chunk.
+    #[error("the index of messages at byte {at} follows no chunk: the chunk before it is lost")]
     LoneIndex {
         /// Its offset.
         at: u64,
     },
     /// An end record before the end of the file.
+    #[error("the end record at byte {at} does not end the file: it was ignored")]
     EarlyEnd {
         /// Its offset.
         at: u64,
     },
     /// Checksum mismatch for a part of the file.
+    #[error(
+        "the CRC of the data section is {found:08x} instead of {told:08x}: bytes of the file are damaged"
+    )]
     Checksum { told: u32, found: u32 },
     /// Messages of channels not declared before them.
+    #[error("messages of channels not declared before them, skipped: {messages}")]
     Undeclared { messages: u64 },
     /// Chunks listed in the index at the end of the file, but missing.
+    #[error("chunks listed in the file's index but missing: {chunks}, the first at byte {at}")]
     MissingChunks {
         /// Expected offset of the first of them.
         at: u64,
         chunks: u64,
     },
     /// A count that differs from the statistics at the end of the file.
+    #[error("the file declares {told} {what}, but contains {found}")]
     Count {
         what: &'static str,
         told: u64,
         found: u64,
     },
     /// A record that is implausibly long.
+    #[error(
+        "the record at byte {at} (opcode 0x{op:02x}) has a declared length of {length} bytes, {}",
+        end_of_long(*.length)
+    )]
     TooLong {
         /// Its offset.
         at: u64,
@@ -132,87 +153,31 @@ impl Loss {
     }
 }
 
-impl fmt::Display for Loss {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Truncated { at, what } => write!(
-                f,
-                "the file ends {what}, without its end record; everything complete up to byte {at} was read"
-            ),
-            Self::Chunk { at, why, span_ns } => {
-                write!(f, "the chunk at byte {at} was skipped: {why}")?;
-                match span_ns {
-                    Some((start, end)) => {
-                        write!(f, " (log times {start} ns to {end} ns)")
-                    }
-                    None => Ok(()),
-                }
-            }
-            Self::Overrun { at } => write!(
-                f,
-                "a record in the chunk at byte {at} runs past the end of the chunk; the rest of the chunk was skipped"
-            ),
-            Self::TooLong { at, op, length } => {
-                let rest = match *length > LONGEST {
-                    true => "more than any record; nothing after it could be read",
-                    false => "and was skipped; --longest-metadata reads longer ones",
-                };
-                write!(
-                    f,
-                    "the record at byte {at} (opcode 0x{op:02x}) has a declared length of {length} bytes, {rest}"
-                )
-            }
-            other => other.describe_record(f),
-        }
+/// Log times that a chunk claims, after the text about it.
+fn log_times(span_ns: Option<(u64, u64)>) -> String {
+    span_ns.map_or_else(String::new, |(start, end)| {
+        format!(" (log times {start} ns to {end} ns)")
+    })
+}
+
+/// What became of a record of such a length.
+fn end_of_long(length: u64) -> &'static str {
+    match length > LONGEST {
+        true => "more than any record; nothing after it could be read",
+        false => "and was skipped; --longest-metadata reads longer ones",
     }
 }
 
-impl Loss {
-    /// Text about single records, and about the file's own claims.
-    fn describe_record(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Unknown {
-                at,
-                op,
-                is_nested: false,
-            } => write!(
-                f,
-                "the record at byte {at} has the opcode 0x{op:02x}, which is not defined: its content is lost"
-            ),
-            Self::Unknown { at, op, .. } => write!(
-                f,
-                "a record in the chunk at byte {at} has the opcode 0x{op:02x}, which is not allowed in a chunk: its \
-                 content is lost"
-            ),
-            Self::Unreadable { at, op } => write!(
-                f,
-                "a record at byte {at} (opcode 0x{op:02x}) cannot be read: what it declares is lost"
-            ),
-            Self::LoneIndex { at } => write!(
-                f,
-                "the index of messages at byte {at} follows no chunk: the chunk before it is lost"
-            ),
-            Self::EarlyEnd { at } => write!(
-                f,
-                "the end record at byte {at} does not end the file: it was ignored"
-            ),
-            Self::Checksum { told, found } => write!(
-                f,
-                "the CRC of the data section is {found:08x} instead of {told:08x}: bytes of the file are damaged"
-            ),
-            Self::Undeclared { messages } => write!(
-                f,
-                "messages of channels not declared before them, skipped: {messages}"
-            ),
-            Self::MissingChunks { at, chunks } => write!(
-                f,
-                "chunks listed in the file's index but missing: {chunks}, the first at byte {at}"
-            ),
-            Self::Count { what, told, found } => {
-                write!(f, "the file declares {told} {what}, but contains {found}")
-            }
-            _ => Ok(()),
-        }
+/// A record of unknown kind in a message.
+fn unknown(at: u64, op: u8, is_nested: bool) -> String {
+    match is_nested {
+        false => format!(
+            "the record at byte {at} has the opcode 0x{op:02x}, which is not defined: its content is lost"
+        ),
+        true => format!(
+            "a record in the chunk at byte {at} has the opcode 0x{op:02x}, which is not allowed in a chunk: its \
+             content is lost"
+        ),
     }
 }
 
