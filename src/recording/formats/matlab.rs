@@ -11,6 +11,7 @@ use super::{
 };
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
+use crate::recording::text::meaning;
 use crate::recording::{TimeAxis, seconds_assumed};
 use crate::unit::NamedUnit;
 
@@ -218,28 +219,6 @@ fn inflated(packed: Element, order: Order) -> Result<(u32, Bytes), Failure> {
     }
 }
 
-/// Names of numbers that are a rate or a step.
-const RATES: [&str; 9] = [
-    "fs",
-    "rate",
-    "samplerate",
-    "samplingrate",
-    "samplefrequency",
-    "samplingfrequency",
-    "abtastrate",
-    "sr",
-    "freqs",
-];
-const STEPS: [&str; 7] = [
-    "dt",
-    "ts",
-    "tsample",
-    "deltat",
-    "sampletime",
-    "samplingtime",
-    "timestep",
-];
-
 fn bare(name: &str) -> String {
     let letters = name.chars().filter(|c| c.is_alphanumeric());
     letters.collect::<String>().to_lowercase()
@@ -250,13 +229,9 @@ fn stated_rate(variables: &[Variable]) -> Result<Option<(String, f64)>, Failure>
     let scalars = variables.iter().filter(|v| v.values.len() == 1);
     let stated = scalars.filter_map(|v| {
         let bare = bare(&v.name.replace("_hz", "").replace("_Hz", ""));
-        let rate = match (
-            RATES.contains(&bare.as_str()),
-            STEPS.contains(&bare.as_str()),
-        ) {
-            (true, _) => v.values[0],
-            (_, true) => 1.0 / v.values[0],
-            _ => return None,
+        let rate = match meaning("variables", &bare)? {
+            "rate" => v.values[0],
+            _ => 1.0 / v.values[0],
         };
         Some((v.name.clone(), plausible_rate(rate)?))
     });

@@ -4,6 +4,7 @@
 use torqcomp_decimal::number;
 
 use super::clock::Clock;
+use super::vocabulary::has;
 
 /// Content of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -140,49 +141,10 @@ fn fortran(text: &str, decimal: u8) -> Option<f64> {
 
 /// Texts for missing numbers other than those of floating point: over range, no value.
 pub fn is_non_finite(text: &str) -> bool {
-    const WORDS: [&str; 37] = [
-        "burnout",
-        "open",
-        "ol",
-        "+ol",
-        "-ol",
-        "o.l",
-        "o.l.",
-        "oload",
-        "ovl",
-        "overload",
-        "overrange",
-        "over range",
-        "out of range",
-        "underrange",
-        "under range",
-        "underflow",
-        "no value",
-        "#div/0!",
-        "#num!",
-        "#ref!",
-        "#value!",
-        "∞",
-        "-∞",
-        "+∞",
-        "n/a",
-        "#n/a",
-        "na",
-        "null",
-        "none",
-        "overflow",
-        "ovrflw",
-        "ovld",
-        "over",
-        "---",
-        "--",
-        "****",
-        "unendlich",
-    ];
     is_not_a_number(text)
         || text.to_ascii_lowercase().starts_with("-1.#")
         || text.to_ascii_lowercase().starts_with("1.#")
-        || WORDS.contains(&text.to_lowercase().as_str())
+        || has("missing numbers", &text.to_lowercase())
         || exceeds(text)
         || is_instruments_mark(text)
         || is_over_range(text)

@@ -4,6 +4,7 @@
 //! Only differences are used, so a time zone matters only if it changes within a record, and the order of day and month
 //! between slashes only if both are at most 12 (the month is then taken to be first).
 
+use super::vocabulary::meaning;
 use crate::recording::moment::date_and_time;
 
 /// Seconds since 1970, for 2001 to 2128.
@@ -23,13 +24,6 @@ pub struct Clock {
     /// Offset of its time zone from UTC in seconds, if given.
     pub ahead_s: Option<i32>,
 }
-
-const MONTHS: [&str; 12] = [
-    "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
-];
-/// Months with other German abbreviations.
-const GERMAN_MONTHS: [(&str, u32); 4] = [("mär", 3), ("mrz", 3), ("mai", 5), ("okt", 10)];
-const GERMAN_DECEMBER: &str = "dez";
 
 impl Clock {
     /// Parses a cell that contains nothing else.
@@ -323,14 +317,7 @@ fn month(text: &str) -> Option<u32> {
         return Some(number as u32);
     }
     let start: String = text.to_lowercase().chars().take(3).collect();
-    if start == GERMAN_DECEMBER {
-        return Some(12);
-    }
-    let german = GERMAN_MONTHS.iter().find(|(name, _)| *name == start);
-    german.map(|(_, number)| *number).or_else(|| {
-        let place = MONTHS.iter().position(|name| *name == start)?;
-        Some(place as u32 + 1)
-    })
+    meaning("months", &start)?.parse().ok()
 }
 
 /// Days from 1970-01-01 to a date of the Gregorian calendar: 365 per year, one more per preceding

@@ -37,6 +37,8 @@ mod vocabulary;
 
 use std::io::{Cursor, Read};
 
+use torqcomp_decimal::number;
+
 use super::{AllSamples, Recording, Segment};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
@@ -60,7 +62,7 @@ pub use rows::{LineNotes, RowPlan};
 pub use stream::{BRIDGE, ChannelPlan, ChannelRows, Problem, StampColumn, StampUse, TextStream};
 pub use table::Layout;
 use table::{FIRST_ROWS, Hints, ReadTable};
-use torqcomp_decimal::number;
+pub(in crate::recording) use vocabulary::meaning;
 
 /// Number of bytes for detecting the encoding.
 const FOR_ENCODING: u64 = 1 << 16;

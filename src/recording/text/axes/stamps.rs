@@ -6,6 +6,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::recording::text::clock::{Clock, unwrap_midnights};
 use crate::recording::text::rows::{Column, ColumnKind};
 use crate::recording::text::units;
+use crate::recording::text::vocabulary::has;
 use crate::recording::{seconds_assumed, typical_step};
 use crate::unit::{NamedUnit, scale_in};
 use torqcomp_model::Unit;
@@ -132,16 +133,10 @@ impl Sources<'_> {
 
     /// Whether a column contains the time between samples, like `INTERVAL` of data loggers.
     pub(super) fn is_steps(&self, place: usize) -> bool {
-        const NAMES: [&str; 4] = [
-            "interval",
-            "intervall",
-            "obtaining interval",
-            "interval time",
-        ];
         let (field, values) = (&self.fields[place], &self.columns[place].values);
         let usual = values.get(1).copied().unwrap_or(f64::NAN);
         let same = || values.iter().filter(|value| **value == usual).count();
-        NAMES.contains(&field.name.to_lowercase().as_str())
+        has("steps", &field.name.to_lowercase())
             && !self.is_clock(place)
             && self.fields.len() > 1
             && 2 * same() > values.len()

@@ -8,6 +8,7 @@ use super::{Row, WORDS};
 use crate::recording::text::cell::Cell;
 use crate::recording::text::head::Table;
 use crate::recording::text::units;
+use crate::recording::text::vocabulary::has;
 use crate::unit::NamedUnit;
 
 /// Number of lines above a table that are searched for its headings.
@@ -299,26 +300,18 @@ fn is_mixed(below: &[String], above: &[String]) -> bool {
 /// Rows under the units with the kind of value, `Avg`, `Smp`, or the storage type, `Double`,
 /// `REAL32`.
 fn is_process_row(cells: &[String]) -> bool {
-    const WORDS: [&str; 14] = [
-        "avg", "smp", "max", "min", "std", "tot", "raw", "actual", "scaled", "sample", "mean",
-        "ts", "rn", "med",
-    ];
-    const TYPES: [&str; 14] = [
-        "double", "float", "single", "int", "integer", "uint", "real", "lreal", "bool", "boolean",
-        "string", "text", "numeric", "datetime",
-    ];
     let is_type = |cell: &str| {
         let stem = cell
             .trim_start_matches("dt_")
             .trim_end_matches(|c: char| c.is_ascii_digit());
-        TYPES.contains(&stem)
+        has("number types", stem)
     };
     let filled: Vec<String> = cells
         .iter()
         .filter(|cell| !cell.is_empty())
         .map(|cell| cell.to_lowercase())
         .collect();
-    let is_process = filled.iter().all(|cell| WORDS.contains(&cell.as_str()));
+    let is_process = filled.iter().all(|cell| has("kinds of value", cell));
     !filled.is_empty() && (is_process || filled.iter().all(|cell| is_type(cell)))
 }
 

@@ -4,6 +4,7 @@ use super::{Entry, Topic};
 use crate::recording::text::cell::Cell;
 use crate::recording::text::clock::Clock;
 use crate::recording::text::units;
+use crate::recording::text::vocabulary::meaning;
 
 /// A number with a unit: `1.00E+09 Sa/s`, `20ms`, `1,000 Hz`.
 #[must_use]
@@ -29,39 +30,14 @@ pub fn quantity(text: &str, decimal: u8) -> Option<(f64, String)> {
     Some((value, text[end..].trim().to_owned()))
 }
 
-/// Units of rate with their values in Hz.
-const RATES: [(&str, f64); 21] = [
-    ("hz", 1.0),
-    ("khz", 1e3),
-    ("mhz", 1e6),
-    ("ghz", 1e9),
-    ("s/s", 1.0),
-    ("sa/s", 1.0),
-    ("ks/s", 1e3),
-    ("ksa/s", 1e3),
-    ("ms/s", 1e6),
-    ("msa/s", 1e6),
-    ("gs/s", 1e9),
-    ("gsa/s", 1e9),
-    ("1/s", 1.0),
-    ("/s", 1.0),
-    ("sps", 1.0),
-    ("ksps", 1e3),
-    ("msps", 1e6),
-    ("samples/s", 1.0),
-    ("samples/sec", 1.0),
-    ("samples per second", 1.0),
-    ("samples/second", 1.0),
-];
-
 /// Rate in Hz from a rate or an interval, depending on the unit; `default_unit` if there is none.
 fn hertz(value: f64, unit: &str, is_interval: bool) -> Option<f64> {
     let lower = unit
         .trim_end_matches(['.', ':', ';', ','])
         .trim()
         .to_lowercase();
-    let rate = RATES.iter().find(|(word, _)| *word == lower);
-    if let Some((_, factor)) = rate {
+    let factor = meaning("units of rate", &lower).and_then(|hz| hz.parse::<f64>().ok());
+    if let Some(factor) = factor {
         return Some(value * factor).filter(|hz| *hz > 0.0);
     }
     let seconds = match lower.as_str() {
