@@ -235,13 +235,8 @@ impl Running<'_> {
         if let Some(failure) = shared.broken.take() {
             return Err(failure);
         }
-        let skipped = treated
-            .iter()
-            .flatten()
-            .filter_map(|treated| match treated {
-                Treated::Skipped(entry) => Some(entry.file.clone()),
-                Treated::Made(_) => None,
-            });
+        let skipped = treated.iter().flatten().filter(|t| t.is_skipped());
+        let skipped = skipped.map(|treated| treated.entry.file.clone());
         let end = RunEnd::new(skipped.collect());
         self.manifest.append(print::json_line(&end))
     }
@@ -262,11 +257,11 @@ impl Running<'_> {
                 entry.error = Some(failure.to_string());
                 entry.seconds = begun.elapsed().as_secs_f64();
                 self.note(&entry);
-                Treated::Made(entry)
+                Treated::made(entry)
             }
         };
         let mut shared = self.lock();
-        shared.failures += u32::from(treated.entry().has_failed());
+        shared.failures += u32::from(treated.entry.has_failed());
         shared.done.count += 1;
         shared.done.bytes += file.bytes;
         shared.progress.report(shared.done, Some(self.all));
@@ -290,7 +285,7 @@ impl Running<'_> {
             if !plan.history.is_in_last(standing) {
                 self.note(standing);
             }
-            return Ok(Treated::Skipped(standing.clone()));
+            return Ok(Treated::skipped(standing.clone()));
         }
         let outputs: Vec<PathBuf> = file.outputs.iter().map(|o| plan.result(o)).collect();
         outputs
@@ -314,7 +309,7 @@ impl Running<'_> {
         if self.note(entry) {
             made.publish_silently()?;
         }
-        Ok(Treated::Made(entry.clone()))
+        Ok(Treated::made(entry.clone()))
     }
 
     /// Appends a line to the manifest; returns whether that succeeded. Without it, no result is

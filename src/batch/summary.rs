@@ -40,41 +40,33 @@ const LISTED: usize = 10;
 /// Name and version of the document of a run.
 pub(crate) const SCHEMA: &str = "torqcomp.batch/1";
 
-/// What became of a recording.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[serde(into = "TreatedEntry")]
-#[schemars(from = "TreatedEntry")]
-pub(super) enum Treated {
-    /// It was worked on, well or not.
-    Made(ManifestEntry),
-    /// Its results were there.
-    Skipped(ManifestEntry),
-}
+/// Status of a recording that was worked on, well or not.
+const MADE: &str = "made";
+/// Status of a recording whose results were there.
+const SKIPPED: &str = "skipped";
 
 /// A recording in the document of a run.
-#[derive(Serialize, JsonSchema)]
-struct TreatedEntry {
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub(super) struct Treated {
     /// `made` (processed, successfully or not), or `skipped`: the results existed.
     status: &'static str,
     #[serde(flatten)]
-    entry: ManifestEntry,
-}
-
-impl From<Treated> for TreatedEntry {
-    fn from(treated: Treated) -> Self {
-        let (status, entry) = match treated {
-            Treated::Made(entry) => ("made", entry),
-            Treated::Skipped(entry) => ("skipped", entry),
-        };
-        Self { status, entry }
-    }
+    pub(super) entry: ManifestEntry,
 }
 
 impl Treated {
-    pub(super) fn entry(&self) -> &ManifestEntry {
-        match self {
-            Self::Made(entry) | Self::Skipped(entry) => entry,
-        }
+    pub(super) fn made(entry: ManifestEntry) -> Self {
+        let status = MADE;
+        Self { status, entry }
+    }
+
+    pub(super) fn skipped(entry: ManifestEntry) -> Self {
+        let status = SKIPPED;
+        Self { status, entry }
+    }
+
+    pub(super) fn is_skipped(&self) -> bool {
+        self.status == SKIPPED
     }
 }
 
@@ -147,12 +139,12 @@ impl BatchResult<'_> {
     }
 
     fn entries(&self) -> impl Iterator<Item = &ManifestEntry> + Clone {
-        self.treated.iter().flatten().map(Treated::entry)
+        self.treated.iter().flatten().map(|treated| &treated.entry)
     }
 
     fn skipped(&self) -> usize {
-        let is_skipped = |treated: &&Treated| matches!(treated, Treated::Skipped(_));
-        self.treated.iter().flatten().filter(is_skipped).count()
+        let treated = self.treated.iter().flatten();
+        treated.filter(|treated| treated.is_skipped()).count()
     }
 
     fn not_begun(&self) -> usize {
@@ -216,7 +208,7 @@ impl BatchResult<'_> {
         ];
         let others = others.into_iter().filter(|(count, _)| *count > 0);
         parts.extend(others.map(|(count, what)| format!("{count} {what}")));
-        let is_made = |treated: &&Option<Treated>| matches!(treated, Some(Treated::Made(_)));
+        let is_made = |treated: &Option<Treated>| treated.as_ref().is_some_and(|t| !t.is_skipped());
         let files = self.plan.files.iter().zip(&self.treated);
         let bytes = files
             .filter(|(_, t)| is_made(t))
@@ -343,7 +335,7 @@ fn codes(warnings: &[NotedWarning]) -> Vec<&str> {
 
 /// A row of the text table; unknown values are `-`.
 fn row(treated: &Treated) -> Vec<String> {
-    let entry = treated.entry();
+    let entry = &treated.entry;
     let figures = &entry.figures;
     let text = |value: Option<f64>, digits| {
         value.map_or_else(|| "-".to_owned(), |value| rounded(value, digits))
@@ -359,10 +351,10 @@ fn row(treated: &Treated) -> Vec<String> {
         text(figures.noise_rms, 3),
         figures.unit.clone().unwrap_or_else(|| "-".to_owned()),
         entry.warnings.len().to_string(),
-        match treated {
-            Treated::Skipped(_) => "skipped".to_owned(),
-            Treated::Made(_) if entry.has_failed() => "failed".to_owned(),
-            Treated::Made(_) => rounded(entry.seconds, 2),
+        match treated.status {
+            SKIPPED => SKIPPED.to_owned(),
+            _ if entry.has_failed() => "failed".to_owned(),
+            _ => rounded(entry.seconds, 2),
         },
     ]
 }
