@@ -14,7 +14,7 @@ use super::index;
 use super::mixed::two_publishers;
 use super::path::{self, PathPart};
 use super::record::input::CountedInput;
-use super::record::reader::RecordReader;
+use super::record::reader::{ChunkReport, RecordReader};
 use super::record::{self, RawMessage};
 use super::route::Route;
 use super::schema::Schema;
@@ -63,7 +63,7 @@ pub struct Inventory {
 }
 
 /// A channel.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 pub struct ChannelReport {
     /// Number in the file.
     pub id: u16,
@@ -132,19 +132,6 @@ pub struct MetadataReport {
     pub name: String,
     /// Keys and values.
     pub pairs: BTreeMap<String, String>,
-}
-
-/// Chunks with the same compression.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-pub struct ChunkReport {
-    /// Compression, empty for none.
-    pub compression: String,
-    /// Chunks.
-    pub chunks: u64,
-    /// Bytes in the file.
-    pub packed_bytes: u64,
-    /// Bytes unpacked.
-    pub unpacked_bytes: u64,
 }
 
 impl Inventory {
@@ -351,16 +338,7 @@ impl Scan {
             channels,
             attachments: self.attachments,
             metadata: self.metadata,
-            chunks: records
-                .chunk_counts()
-                .iter()
-                .map(|(compression, count)| ChunkReport {
-                    compression: compression.clone(),
-                    chunks: count.chunks,
-                    packed_bytes: count.packed,
-                    unpacked_bytes: count.unpacked,
-                })
-                .collect(),
+            chunks: records.chunk_counts().values().cloned().collect(),
             is_closed: records.is_closed(),
             is_lossy: records.losses().count > 0 || self.broken > 0,
             warnings,
@@ -428,10 +406,7 @@ fn report(channel: &TopicChannel, seen: Option<&ChannelCount>) -> ChannelReport 
         publish_ns: seen.map(|seen| seen.publish_ns),
         rate_hz: seen.and_then(rate_hz),
         out_of_order: seen.map_or(0, |seen| seen.out_of_order),
-        unreadable: None,
-        stamp: None,
-        leaves: Vec::new(),
-        has_more_leaves: false,
+        ..ChannelReport::default()
     };
     match layout {
         Ok((encoding, schema)) => {

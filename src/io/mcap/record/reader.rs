@@ -5,6 +5,8 @@ use std::io::Read;
 use std::ops::Range;
 
 use mcap::records::op;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::census::Census;
 use super::chunk::{
@@ -16,14 +18,17 @@ use super::{RECORD_HEAD, record_head, split_record};
 use crate::failure::Failure;
 use crate::io::Input;
 
-/// Number of chunks of a compression, and their sizes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct ChunkCount {
+/// Chunks with the same compression.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+pub struct ChunkReport {
+    /// Compression, empty for none.
+    pub compression: String,
+    /// Chunks.
     pub chunks: u64,
-    /// Stored size in bytes.
-    pub packed: u64,
-    /// Claimed decompressed size in bytes.
-    pub unpacked: u64,
+    /// Bytes in the file.
+    pub packed_bytes: u64,
+    /// Bytes unpacked.
+    pub unpacked_bytes: u64,
 }
 
 /// Records of a file.
@@ -39,7 +44,7 @@ pub(crate) struct RecordReader {
     at: usize,
     /// Offset in the file of the current record, or of the chunk that contains it.
     record_offset: u64,
-    chunk_counts: BTreeMap<String, ChunkCount>,
+    chunk_counts: BTreeMap<String, ChunkReport>,
     census: Census,
     is_counted: bool,
 }
@@ -94,7 +99,7 @@ impl RecordReader {
     }
 
     /// Chunks so far, by the name of their compression.
-    pub fn chunk_counts(&self) -> &BTreeMap<String, ChunkCount> {
+    pub fn chunk_counts(&self) -> &BTreeMap<String, ChunkReport> {
         &self.chunk_counts
     }
 
@@ -192,10 +197,15 @@ impl RecordReader {
         let front = chunk_front(body);
         if let Some((header, _)) = &front {
             let count = self.chunk_counts.entry(header.compression.clone());
-            let count = count.or_default();
+            let count = count.or_insert_with_key(|compression| ChunkReport {
+                compression: compression.clone(),
+                ..ChunkReport::default()
+            });
             count.chunks += 1;
-            count.packed = count.packed.saturating_add(header.compressed_size);
-            count.unpacked = count.unpacked.saturating_add(header.uncompressed_size);
+            count.packed_bytes = count.packed_bytes.saturating_add(header.compressed_size);
+            count.unpacked_bytes = count
+                .unpacked_bytes
+                .saturating_add(header.uncompressed_size);
         }
         let is_long = front.as_ref().is_some_and(|(header, _)| is_long(header));
         if is_long {
