@@ -10,49 +10,9 @@ use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, Fi
 
 use crate::io::mcap::decode::Encoding;
 
-const ROS2_DEFINITION: &str = "\
-std_msgs/Header header
-string[] name
-float64[] position
-float64[] velocity
-float64[] effort
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-";
-
-const ROS1_DEFINITION: &str = "\
-Header header
-string[] name
-float64[] position
-float64[] velocity
-float64[] effort
-================================================================================
-MSG: std_msgs/Header
-uint32 seq
-time stamp
-string frame_id
-";
-
-const JSON_DEFINITION: &str = r#"{
-  "title": "torqcomp.Torque",
-  "type": "object",
-  "properties": {
-    "timestamp": {
-      "type": "object",
-      "title": "time",
-      "properties": {"sec": {"type": "integer", "minimum": 0}, "nsec": {"type": "integer", "minimum": 0, "maximum": 999999999}}
-    },
-    "name": {"type": "string"},
-    "compensated_torque_n_m": {"type": "number", "description": "compensated torque in N m"}
-  }
-}
-"#;
+const ROS2_DEFINITION: &str = include_str!("definitions/joint_state.ros2msg");
+const ROS1_DEFINITION: &str = include_str!("definitions/joint_state.ros1msg");
+const JSON_DEFINITION: &str = include_str!("definitions/torque.schema.json");
 
 /// Writes torques as messages.
 #[derive(Debug)]
