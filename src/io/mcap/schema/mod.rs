@@ -31,32 +31,36 @@ pub enum Number {
     F64,
 }
 
+/// Each type of number, in their order, with its ROS name and its size in CDR and ROS 1.
+const NUMBERS: [(Number, &str, u8); 11] = [
+    (Number::Bool, "bool", 1),
+    (Number::I8, "int8", 1),
+    (Number::U8, "uint8", 1),
+    (Number::I16, "int16", 2),
+    (Number::U16, "uint16", 2),
+    (Number::I32, "int32", 4),
+    (Number::U32, "uint32", 4),
+    (Number::I64, "int64", 8),
+    (Number::U64, "uint64", 8),
+    (Number::F32, "float32", 4),
+    (Number::F64, "float64", 8),
+];
+
 impl Number {
+    /// The type with this ROS name.
+    pub fn named(name: &str) -> Option<Self> {
+        let found = NUMBERS.iter().find(|(_, known, _)| *known == name)?;
+        Some(found.0)
+    }
+
     /// Size in CDR and ROS 1.
     pub fn size(self) -> u8 {
-        match self {
-            Self::Bool | Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::I64 | Self::U64 | Self::F64 => 8,
-        }
+        NUMBERS[self as usize].2
     }
 
     /// ROS name.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Bool => "bool",
-            Self::I8 => "int8",
-            Self::U8 => "uint8",
-            Self::I16 => "int16",
-            Self::U16 => "uint16",
-            Self::I32 => "int32",
-            Self::U32 => "uint32",
-            Self::I64 => "int64",
-            Self::U64 => "uint64",
-            Self::F32 => "float32",
-            Self::F64 => "float64",
-        }
+        NUMBERS[self as usize].1
     }
 }
 

@@ -229,14 +229,8 @@ impl<'a> Parser<'a, '_> {
     fn number(&mut self, first: &str) -> Result<Option<Number>, SchemaError> {
         let number = match first {
             "boolean" => Number::Bool,
-            "octet" | "uint8" | "char" => Number::U8,
-            "int8" => Number::I8,
-            "short" | "int16" => Number::I16,
-            "uint16" => Number::U16,
-            "int32" => Number::I32,
-            "uint32" => Number::U32,
-            "int64" => Number::I64,
-            "uint64" => Number::U64,
+            "octet" | "char" => Number::U8,
+            "short" => Number::I16,
             "float" => Number::F32,
             "double" => Number::F64,
             "long" if self.skip("long") => Number::I64,
@@ -250,6 +244,8 @@ impl<'a> Parser<'a, '_> {
                 "long" => Number::U32,
                 other => return Err(self.error(format_args!("\"unsigned {other}\" is not a type"))),
             },
+            // Only whole numbers have the names of ROS here as well.
+            _ if first.contains("int") => return Ok(Number::named(first)),
             _ => return Ok(None),
         };
         Ok(Some(number))

@@ -237,20 +237,10 @@ fn is_constant(line: &str) -> bool {
 }
 
 fn number(name: &str) -> Option<Number> {
-    Some(match name {
-        "bool" => Number::Bool,
-        "byte" | "char" | "uint8" => Number::U8,
-        "int8" => Number::I8,
-        "int16" => Number::I16,
-        "uint16" => Number::U16,
-        "int32" => Number::I32,
-        "uint32" => Number::U32,
-        "int64" => Number::I64,
-        "uint64" => Number::U64,
-        "float32" => Number::F32,
-        "float64" => Number::F64,
-        _ => return None,
-    })
+    match name {
+        "byte" | "char" => Some(Number::U8),
+        _ => Number::named(name),
+    }
 }
 
 #[cfg(test)]
