@@ -5,7 +5,7 @@ use torqcomp_decimal::digits;
 
 use torqcomp_model::Estimate;
 
-use super::update::{COMMON, CORRELATIONS, MODES};
+use super::update::{COMMON, CORRELATIONS, MODES, table_of};
 use super::{Given, MODE_CORRELATIONS, Stand};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::unit_of_quotient;
@@ -61,14 +61,8 @@ impl Refined<'_> {
 
     /// A quantity with its standard uncertainty and its source.
     fn quantity(&self, (number, std): (f64, Option<f64>), unit: &str) -> Item {
-        let text = |number: f64| format!("{} {unit}", digits::text(number, 9));
-        let mut table = InlineTable::new();
-        table.insert("value", text(number).trim().into());
-        if let Some(std) = std {
-            table.insert("std", text(std).trim().into());
-        }
-        table.insert("source", self.source.as_str().into());
-        value(table)
+        let estimate = Estimate::of(unit.to_owned(), number, std);
+        value(table_of(&estimate, Some(&self.source)))
     }
 
     fn write_mechanics(&self, document: &mut DocumentMut, declared: Option<&Stand>) {

@@ -145,15 +145,22 @@ impl<'a> Section<'a> {
         inline.ok_or_else(|| self.fail(key, format_args!("expected sections written {title}")))
     }
 
+    /// The value of a key, as `read` from its item.
+    fn value<T>(
+        &self,
+        key: &'static str,
+        read: fn(&'a Item) -> Option<T>,
+        expected: &str,
+    ) -> Result<Option<T>, Failure> {
+        let value = self.item(key).map(|item| read(item).ok_or(expected));
+        value
+            .transpose()
+            .map_err(|expected| self.fail(key, expected))
+    }
+
     /// A text.
     pub fn text(&self, key: &'static str) -> Result<Option<&'a str>, Failure> {
-        match self.item(key) {
-            None => Ok(None),
-            Some(item) => match item.as_str() {
-                Some(text) => Ok(Some(text)),
-                None => Err(self.fail(key, "expected a text in quotes")),
-            },
-        }
+        self.value(key, Item::as_str, "expected a text in quotes")
     }
 
     /// One of several words.
@@ -173,13 +180,7 @@ impl<'a> Section<'a> {
 
     /// A whole number.
     pub fn whole(&self, key: &'static str) -> Result<Option<i64>, Failure> {
-        match self.item(key) {
-            None => Ok(None),
-            Some(item) => match item.as_integer() {
-                Some(number) => Ok(Some(number)),
-                None => Err(self.fail(key, "expected a whole number")),
-            },
-        }
+        self.value(key, Item::as_integer, "expected a whole number")
     }
 
     /// A quantity: a text such as `"22.5 V"`, or a table of `value`, `std` and `source`.

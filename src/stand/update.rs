@@ -42,21 +42,14 @@ impl Entry {
         estimate: &Estimate,
         source: Option<&str>,
     ) -> Self {
-        let unit = estimate.unit();
-        let text = |number: f64| format!("{} {unit}", number_text(number)).trim().to_owned();
-        let mut table = InlineTable::new();
-        table.insert("value", text(estimate.value()).into());
-        if let Some(std) = estimate.std_uncertainty() {
-            table.insert("std", text(std).into());
-        }
-        if let Some(source) = source {
-            table.insert("source", source.into());
-        }
-        let content = Value::InlineTable(table);
+        Self::of(section, key, table_of(estimate, source))
+    }
+
+    fn of(section: &'static str, key: &'static str, content: impl Into<Value>) -> Self {
         Self {
             section,
             key,
-            content,
+            content: content.into(),
         }
     }
 
@@ -69,12 +62,7 @@ impl Entry {
     /// A text.
     #[must_use]
     pub fn text(section: &'static str, key: &'static str, text: &str) -> Self {
-        let content = text.into();
-        Self {
-            section,
-            key,
-            content,
-        }
+        Self::of(section, key, text)
     }
 
     /// `[[modes]]`, from the entries of each mode.
@@ -88,22 +76,13 @@ impl Entry {
             }
             array.push(table);
         }
-        Self {
-            section: MODES,
-            key: "",
-            content: Value::Array(array),
-        }
+        Self::of(MODES, "", array)
     }
 
     /// A whole number.
     #[must_use]
     pub fn whole(section: &'static str, key: &'static str, number: i64) -> Self {
-        let content = number.into();
-        Self {
-            section,
-            key,
-            content,
-        }
+        Self::of(section, key, number)
     }
 
     /// Points of `[calibration]`: reading, torque and its standard uncertainty, each as text.
@@ -121,11 +100,7 @@ impl Entry {
         }
         array.set_trailing_comma(true);
         array.set_trailing("\n");
-        Self {
-            section: "calibration",
-            key: "points",
-            content: Value::Array(array),
-        }
+        Self::of("calibration", "points", array)
     }
 }
 
@@ -347,9 +322,22 @@ fn invalid(name: &str, message: impl std::fmt::Display) -> Failure {
     Failure::failed(ErrorCode::InvalidStand, message).at(name)
 }
 
-/// Nine significant digits, more than any record can determine.
-fn number_text(number: f64) -> String {
-    digits::text(number, 9)
+/// A quantity with its standard uncertainty and its source, with nine significant digits, more than any record can
+/// determine.
+pub(super) fn table_of(estimate: &Estimate, source: Option<&str>) -> InlineTable {
+    let text = |number: f64| {
+        let text = format!("{} {}", digits::text(number, 9), estimate.unit());
+        text.trim().to_owned()
+    };
+    let mut table = InlineTable::new();
+    table.insert("value", text(estimate.value()).into());
+    if let Some(std) = estimate.std_uncertainty() {
+        table.insert("std", text(std).into());
+    }
+    if let Some(source) = source {
+        table.insert("source", source.into());
+    }
+    table
 }
 
 /// Whether a stand file defines the conversion of its record to torque.
