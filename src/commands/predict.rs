@@ -71,29 +71,21 @@ struct Stiffness {
 
 impl<'a> Drawing<'a> {
     fn of(stand: &'a Stand) -> Result<Self, Failure> {
-        let wrong = |error: &dyn std::fmt::Display| stand.failed(ErrorCode::InvalidStand, error);
-        let parts: Vec<&Estimate> = stand.parts.iter().map(|p| &p.inertia).collect();
-        let inertia = if parts.is_empty() {
-            None
-        } else {
-            let sum = Estimate::derive(Kind::Inertia, "drawing", &parts, |x| x.iter().sum());
-            Some(sum.map_err(|e| wrong(&e))?)
-        };
-        let damping = match &stand.friction {
-            None => None,
-            Some(f) => {
-                let inputs = [&f.force_change, &f.speed_change, &f.radius];
-                let slope = |x: &[f64]| {
-                    viscous_from_friction_slope_n_m_s_per_rad(x[0] / x[1], x[2]).unwrap_or(f64::NAN)
-                };
-                let found = Estimate::derive(Kind::AngularDamping, "drawing", &inputs, slope);
-                Some(found.map_err(|e| wrong(&e))?)
-            }
+        let parts: Vec<Option<&Estimate>> = stand.parts.iter().map(|p| Some(&p.inertia)).collect();
+        let sum = derive(stand, Kind::Inertia, &parts, |x| x.iter().sum())?;
+        let friction = stand.friction.as_ref();
+        let inputs = [
+            friction.map(|f| &f.force_change),
+            friction.map(|f| &f.speed_change),
+            friction.map(|f| &f.radius),
+        ];
+        let slope = |x: &[f64]| {
+            viscous_from_friction_slope_n_m_s_per_rad(x[0] / x[1], x[2]).unwrap_or(f64::NAN)
         };
         Ok(Self {
             stiffness: stand.beam.as_ref().map(Stiffness::of),
-            inertia,
-            damping,
+            inertia: sum.filter(|_| !parts.is_empty()),
+            damping: derive(stand, Kind::AngularDamping, &inputs, slope)?,
             measured: Measured::of(stand)?,
             stand,
         })
@@ -148,7 +140,7 @@ impl<'a> Drawing<'a> {
         let frequency = |x: &[f64]| {
             SecondOrder::new(x[0], 0.0, x[1]).map_or(f64::NAN, |stand| stand.natural_frequency_hz())
         };
-        let predicted = self.derive(Kind::Frequency, &[inertia, slender], frequency)?;
+        let predicted = derive(self.stand, Kind::Frequency, &[inertia, slender], frequency)?;
         let mut natural = constant(
             "natural_frequency",
             predicted.as_ref(),
@@ -162,7 +154,7 @@ impl<'a> Drawing<'a> {
         let ratio = |x: &[f64]| {
             SecondOrder::new(x[0], x[1], x[2]).map_or(f64::NAN, |stand| stand.damping_ratio())
         };
-        let predicted = self.derive(Kind::Ratio, &[inertia, damping, slender], ratio)?;
+        let predicted = derive(self.stand, Kind::Ratio, &[inertia, damping, slender], ratio)?;
         let damping_ratio = PredictedConstant {
             by: "stiffness, inertia and damping above",
             ..constant(
@@ -174,21 +166,6 @@ impl<'a> Drawing<'a> {
             )
         };
         Ok([natural, damping_ratio])
-    }
-
-    /// An estimate derived from others, if all of them are available.
-    fn derive(
-        &self,
-        kind: Kind,
-        inputs: &[Option<&Estimate>],
-        f: impl Fn(&[f64]) -> f64,
-    ) -> Result<Option<Estimate>, Failure> {
-        let Some(inputs) = inputs.iter().copied().collect::<Option<Vec<_>>>() else {
-            return Ok(None);
-        };
-        Estimate::derive(kind, "drawing", &inputs, f)
-            .map(Some)
-            .map_err(|error| self.stand.failed(ErrorCode::InvalidStand, error))
     }
 
     /// Adds the contribution of each effect of the drawing to a constant derived from the stiffness.
@@ -301,6 +278,21 @@ impl<'a> Drawing<'a> {
             enumeration(&causes, "or")
         ))
     }
+}
+
+/// An estimate derived from others of the drawing, if all of them are available.
+fn derive(
+    stand: &Stand,
+    kind: Kind,
+    inputs: &[Option<&Estimate>],
+    f: impl Fn(&[f64]) -> f64,
+) -> Result<Option<Estimate>, Failure> {
+    let Some(inputs) = inputs.iter().copied().collect::<Option<Vec<_>>>() else {
+        return Ok(None);
+    };
+    let derived = Estimate::derive(kind, "drawing", &inputs, f);
+    let derived = derived.map_err(|error| stand.failed(ErrorCode::InvalidStand, error))?;
+    Ok(Some(derived))
 }
 
 impl Stiffness {
