@@ -248,13 +248,9 @@ fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
         "--train and --holdout need --applied COL, the channel with the applied quantity; give free decays, which have \
          none, with --decay and --holdout-decay",
     )?;
-    let read = AlignedChannels::read(&Input::of(file), &choices, &args.reading)?;
-    let mut channels = read.channels.into_iter();
-    let (Some(applied), Some(measured)) = (channels.next(), channels.next()) else {
-        return Err(
-            Failure::failed(ErrorCode::ChannelNotFound, "two channels are needed").at(&read.source),
-        );
-    };
+    let mut read = AlignedChannels::read(&Input::of(file), &choices, &args.reading)?;
+    let measured = read.channels.swap_remove(1);
+    let applied = read.channels.swap_remove(0);
     measured.must_be_as_recorded(&read.source)?;
     let count = applied.samples.len();
     if count < FEWEST {

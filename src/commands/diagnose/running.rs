@@ -13,10 +13,8 @@ use crate::stand::Stand;
 /// The record of the measured quantity alone.
 pub(super) fn measured_alone(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
     let choice = ChannelChoice::measured_alone(&args.measured, args.measured_unit.as_deref());
-    let read = AlignedChannels::read(&Input::of(file), &[choice], &args.reading)?;
-    let measured = read.channels.into_iter().next().ok_or_else(|| {
-        Failure::failed(ErrorCode::ChannelNotFound, "a channel is needed").at(&read.source)
-    })?;
+    let mut read = AlignedChannels::read(&Input::of(file), &[choice], &args.reading)?;
+    let measured = read.channels.swap_remove(0);
     measured.must_be_as_recorded(&read.source)?;
     Ok(Pair {
         source: read.source,
