@@ -134,10 +134,10 @@ impl Opened {
         let record = &args.record;
         let input = Input::of(record.input());
         let stream = ChannelStream::open(&input, &record.choice, &record.reading)?;
-        if stream.is_compensated {
-            return Err(already_compensated(&stream.source, &stream.name));
+        if stream.channel.is_compensated {
+            return Err(already_compensated(&stream.source, &stream.channel.name));
         }
-        let chain = stand.calibration(stream.channel(), args.units.into())?;
+        let chain = stand.calibration(stream.channel.recorded(), args.units.into())?;
         Ok(Self {
             stand,
             stream,
@@ -187,8 +187,8 @@ impl Plan {
         CompensateReport {
             input: stream.source.clone(),
             dialect: stream.dialect.clone(),
-            channel: stream.name.clone(),
-            channel_unit: unit_text(stream.unit.as_ref()).to_owned(),
+            channel: stream.channel.name.clone(),
+            channel_unit: unit_text(stream.channel.unit.as_ref()).to_owned(),
             taken_as: "recorded",
             is_part: args.record.reading.range.is_some(),
             stand: self.stand.file.clone(),
@@ -203,9 +203,9 @@ impl Plan {
             levels: chain.levels(),
             modes: warnings::modes(&self.stand),
             rate_hz: stream.rate_hz,
-            rate_std_hz: stream.time.rate_std_hz,
-            filled: stream.filled.clone(),
-            rate_from: stream.time.rate_sentence(),
+            rate_std_hz: stream.channel.axis.rate_std_hz,
+            filled: stream.channel.filled.clone(),
+            rate_from: stream.channel.axis.rate_sentence(),
             method: match self.undo {
                 Some(_) => "refined",
                 None if args.whole_record => "whole-record",

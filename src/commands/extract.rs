@@ -30,10 +30,10 @@ pub fn work(args: &Extract) -> Result<Made, Failure> {
         stream.source,
         stream.dialect,
         print::rounded(stream.rate_hz, 9),
-        stream.time.rate_sentence()
+        stream.channel.axis.rate_sentence()
     );
     let rate_hz = stream.rate_hz;
-    let (samples, summary) = if stream.time.is_resampled() {
+    let (samples, summary) = if stream.channel.axis.is_resampled() {
         write_resampled(args, stream, &mut output)?
     } else {
         write_as_it_is(args, stream, &mut output)?
@@ -53,11 +53,11 @@ pub fn work(args: &Extract) -> Result<Made, Failure> {
 
 /// `time_s`, and the name of the channel with its unit in brackets.
 fn heading(stream: &ChannelStream) -> Vec<u8> {
-    let mut name = print::visible(stream.name.clone());
-    if stream.is_compensated && !names_compensated(&name) {
+    let mut name = print::visible(stream.channel.name.clone());
+    if stream.channel.is_compensated && !names_compensated(&name) {
         name = format!("{COMPENSATED}{name}");
     }
-    if let Some(unit) = &stream.unit {
+    if let Some(unit) = &stream.channel.unit {
         name = format!("{name} [{}]", unit.text);
     }
     // A spreadsheet would interpret it as a formula.
@@ -75,7 +75,11 @@ fn write_as_it_is(
     stream: ChannelStream,
     output: &mut Output,
 ) -> Result<(usize, StreamSummary), Failure> {
-    let (grid, rate_hz, start) = (stream.time.grid.clone(), stream.rate_hz, stream.start);
+    let (grid, rate_hz, start) = (
+        stream.channel.axis.grid.clone(),
+        stream.rate_hz,
+        stream.start,
+    );
     let (mut blocks, plan, mut validator) = stream.into_parts(0);
     let mut block = Block::default();
     let mut text = Text::default();

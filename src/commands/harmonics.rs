@@ -129,7 +129,7 @@ pub fn work(args: &cli::Harmonics) -> Result<Made, Failure> {
     let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
     let mut output = args.result.open(&inputs)?;
     let source = stream.source.clone();
-    let (name, unit) = (stream.name.clone(), stream.unit.clone());
+    let (name, unit) = (stream.channel.name.clone(), stream.channel.unit.clone());
     let record = UniformRecord::read(stream, |values| super::convert(&way.chain, values))?;
     let channel = (name.as_str(), unit.as_ref());
     let report = fit(args, &way, &record, &source, channel);
@@ -155,8 +155,8 @@ impl WayBack {
         stand: Option<Stand>,
         units: UnitSystem,
     ) -> Result<Self, Failure> {
-        if stream.is_compensated {
-            let chain = Calibration::of_compensated(stream.channel(), units)?;
+        if stream.channel.is_compensated {
+            let chain = Calibration::of_compensated(stream.channel.recorded(), units)?;
             return Ok(Self { chain, stand: None });
         }
         let stand = stand.ok_or_else(|| {
@@ -165,13 +165,13 @@ impl WayBack {
                 format_args!(
                     "\"{}\" is taken as recorded, with the stand's response in it; give --stand FILE (only a channel \
                      marked \"{COMPENSATED}\", a result of compensate, needs none)",
-                    stream.name
+                    stream.channel.name
                 ),
             )
             .at(&stream.source)
         })?;
         stand.mechanics()?;
-        let chain = stand.calibration(stream.channel(), units)?;
+        let chain = stand.calibration(stream.channel.recorded(), units)?;
         let inverse = stand.inverse()?;
         Ok(Self {
             chain,

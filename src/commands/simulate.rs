@@ -14,7 +14,7 @@ use crate::io::{ChannelChoice, Flags, Input};
 use crate::outcome::{Made, RecordFigures};
 use crate::print::{Report, enumeration, plural, short};
 use crate::recording::moment::Moment;
-use crate::recording::{AlignedChannels, ChannelStream, UniformStream, resampled};
+use crate::recording::{AlignedChannels, Channel, ChannelStream, UniformStream, resampled};
 use crate::stand::{self, Calibration, Stand, TransducerSignal};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
@@ -68,7 +68,7 @@ pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
     let inputs = [args.input(), args.stand.as_path()];
     let mut output = args.result.open(&inputs)?;
     let mut of_channel = Vec::new();
-    let units = ChannelUnits::of(&stand, applied.channel(), &mut of_channel)?;
+    let units = ChannelUnits::of(&stand, applied.channel.recorded(), &mut of_channel)?;
     let chain = stand.chain()?;
     let between = args.between.into();
     let axis = applied.axis();
@@ -95,7 +95,7 @@ pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
     let report = SimulateReport {
         input: args.input().shown().to_string(),
         stand: args.stand.shown().to_string(),
-        applied: applied.name,
+        applied: applied.channel.name,
         applied_unit: units.applied_text,
         measured_unit: units.measured_text,
         input_between_samples: between.name(),
@@ -173,9 +173,7 @@ fn simulate(
 
 /// The applied quantity as read, in the unit of the file.
 struct AppliedInput {
-    name: String,
-    unit: Option<NamedUnit>,
-    unit_text: Option<String>,
+    channel: Channel,
     axis: (f64, Moment),
     /// Standard uncertainty of the rate, if it comes from stamps.
     rate_std_hz: Option<f64>,
@@ -202,39 +200,27 @@ impl AppliedInput {
         if !input.is_mcap()? {
             let stream = ChannelStream::open(&input, &choice, &args.reading)?;
             return Ok(Self {
-                name: stream.name.clone(),
-                unit: stream.unit.clone(),
-                unit_text: stream.unit_text.clone(),
+                channel: stream.channel.clone(),
                 axis: (stream.rate_hz, stream.start),
-                rate_std_hz: stream.time.rate_std_hz,
+                rate_std_hz: stream.channel.axis.rate_std_hz,
                 samples: AppliedSamples::Text(Some(Box::new(UniformStream::of(stream)?))),
                 warnings: Vec::new(),
                 is_lossy: false,
             });
         }
         let mut read = AlignedChannels::read(&input, &[choice], &args.reading)?;
-        let chosen = read.channels.swap_remove(0);
+        let mut chosen = read.channels.swap_remove(0);
         if chosen.samples.len() < 2 {
             return Err(too_short());
         }
         Ok(Self {
-            name: chosen.name,
-            unit: chosen.unit,
-            unit_text: chosen.unit_text,
             axis: (read.rate_hz, read.start),
             rate_std_hz: read.rate_std_hz,
-            samples: AppliedSamples::Messages(chosen.samples),
+            samples: AppliedSamples::Messages(std::mem::take(&mut chosen.samples)),
+            channel: chosen,
             warnings: read.warnings,
             is_lossy: read.is_lossy,
         })
-    }
-
-    fn channel(&self) -> RecordedChannel<'_> {
-        RecordedChannel {
-            name: &self.name,
-            unit: self.unit.as_ref(),
-            unit_text: self.unit_text.as_deref(),
-        }
     }
 
     /// Samples per second, and the time of the first sample.
@@ -261,7 +247,7 @@ impl AppliedInput {
             self.is_lossy = summary.lost.is_some();
             self.warnings = summary.all_warnings();
             let was = ["was", "are not uniform"];
-            let told = done.map(|done| resampled(&self.name, was, self.axis, &done));
+            let told = done.map(|done| resampled(&self.channel.name, was, self.axis, &done));
             self.warnings.extend(told);
         }
         Ok(false)

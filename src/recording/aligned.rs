@@ -7,7 +7,7 @@ use torqcomp_dsp::resample::{Resampled, Resampler};
 use super::memory_stream::{check_cells, check_size};
 use super::moment::Moment;
 use super::stamps::check_resampled;
-use super::{Channel, Recording, Selection, typical_step};
+use super::{Channel, Recording, Selection, TimeAxis, typical_step};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::{ChannelChoice, Input, Reading};
 use crate::print;
@@ -145,7 +145,9 @@ impl AlignedChannels {
                     .rounded_stamps(&aligned.source, chosen[0].rate_hz);
                 aligned.warnings.extend(rounded);
             }
-            let empty = chosen.iter().map(|c| aligned_channel(c, Vec::new()));
+            let empty = chosen
+                .iter()
+                .map(|c| c.on_axis(TimeAxis::default(), Vec::new()));
             let empty = places.into_iter().zip(empty).collect();
             aligned.channels = filled(&mut recording, empty, count.unwrap_or(0));
         } else {
@@ -194,7 +196,7 @@ impl AlignedChannels {
             }
             note_worst(&mut worst, &resampler.finish(&mut samples));
             samples.truncate(count as usize);
-            self.channels.push(aligned_channel(c, samples));
+            self.channels.push(c.on_axis(TimeAxis::default(), samples));
         }
         let lengths = self.channels.iter().map(|t| t.samples.len());
         let shortest = lengths.min().unwrap_or(0);
@@ -247,20 +249,6 @@ fn note_worst(worst: &mut Resampled, done: &Resampled) {
     worst.repeated = worst.repeated.max(done.repeated);
     worst.longest_step_s = worst.longest_step_s.max(done.longest_step_s);
     worst.largest_jitter = worst.largest_jitter.max(done.largest_jitter);
-}
-
-/// A selected channel with samples on another axis.
-fn aligned_channel(selection: &Selection, samples: Vec<f64>) -> Channel {
-    let channel = selection.channel;
-    Channel {
-        name: channel.name.clone(),
-        heading: channel.heading.clone(),
-        samples,
-        unit: selection.unit.clone(),
-        unit_text: channel.unit_text.clone(),
-        is_compensated: channel.is_compensated,
-        ..Channel::default()
-    }
 }
 
 /// The channels with their first samples, which are moved out of the recording, as they may be most of

@@ -59,16 +59,14 @@ impl ChannelStream {
         warnings.extend(selection.warnings.iter().cloned());
         Ok(Self {
             dialect: recording.dialect.clone(),
-            is_compensated: channel.is_compensated,
-            name: channel.name.clone(),
-            unit: selection.unit.clone(),
-            unit_text: channel.unit_text.clone(),
             rate_hz: time.rate_hz.unwrap_or(selection.rate_hz),
             start: time.start.unwrap_or_default(),
-            time,
+            channel: Channel {
+                filled: channel.filled.clone(),
+                ..selection.on_axis(time, Vec::new())
+            },
             origin: None,
             any_steps: reading.any_steps,
-            filled: channel.filled.clone(),
             warnings,
             blocks: Box::new(MemoryBlocks {
                 samples: channel.samples.clone(),

@@ -5,7 +5,7 @@ use std::io::Read;
 use super::block::{Block, BlockSource};
 use super::stamps::StampGrid;
 use super::stream::ChannelStream;
-use super::{TimeAxis, choice, messages};
+use super::{Channel, TimeAxis, choice, messages};
 use crate::failure::{ErrorCode, Failure, RowKind};
 use crate::io::mcap::SignalReader;
 use crate::io::mcap::decode::Encoding;
@@ -68,16 +68,18 @@ impl ChannelStream {
         Ok(Self {
             source: name,
             dialect: format!("MCAP, {}", messages::describe(&chosen)),
-            is_compensated: chosen.is_compensated,
-            name: channel,
-            unit,
-            unit_text: chosen.unit.as_ref().map(|found| found.unit.clone()),
             rate_hz: time.rate_hz.unwrap_or(f64::NAN),
             start: time.start.unwrap_or_default(),
-            time,
+            channel: Channel {
+                name: channel,
+                unit,
+                unit_text: chosen.unit.as_ref().map(|found| found.unit.clone()),
+                is_compensated: chosen.is_compensated,
+                axis: time,
+                ..Channel::default()
+            },
             warnings: warning.into_iter().chain(overridden).collect(),
             any_steps: reading.any_steps,
-            filled: Vec::new(),
             origin: Some(MessageOrigin {
                 encoding: Encoding::of(&chosen.encoding),
                 log_offset_ns,

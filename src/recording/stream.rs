@@ -10,10 +10,9 @@ use super::moment::Moment;
 use super::stamps::{StampGrid, is_uniform};
 use super::text::{ChannelPlan, StampColumn, StampUse, TextFile, TextStream};
 use super::validator::{StreamValidator, TextLines};
-use super::{FilledSpan, RateFrom, Recording, TimeAxis, checkpoints, formats, progress};
+use super::{Channel, RateFrom, Recording, TimeAxis, checkpoints, formats, progress};
 use crate::failure::Failure;
 use crate::io::{ChannelChoice, HEAD, Input, Reading};
-use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
 /// A selected channel of a recording, open for reading.
@@ -22,24 +21,14 @@ pub(crate) struct ChannelStream {
     pub(crate) source: String,
     /// Description of the file's encoding, for messages.
     pub(crate) dialect: String,
-    /// Name of the channel, without the unit.
-    pub(crate) name: String,
-    /// Unit of its samples, if known.
-    pub(crate) unit: Option<NamedUnit>,
-    /// Its unit as written in the file, known or not.
-    pub(crate) unit_text: Option<String>,
-    /// Whether it is a result of `compensate`, without the stand's response.
-    pub(crate) is_compensated: bool,
-    /// Time axis.
-    pub(crate) time: TimeAxis,
+    /// The channel on its time axis, without the samples; its unit is that of the file or the given one.
+    pub(crate) channel: Channel,
     /// Sampling rate in Hz.
     pub(crate) rate_hz: f64,
     /// Time of the first sample: its stamp, or the start given by the file or the user.
     pub(crate) start: Moment,
     /// For messages, data needed to copy their file.
     pub(crate) origin: Option<MessageOrigin>,
-    /// Intervals of filled samples.
-    pub(crate) filled: Vec<FilledSpan>,
     /// Whether irregular stamps only cause a warning.
     pub(super) any_steps: bool,
     /// Warnings known before reading.
@@ -50,15 +39,6 @@ pub(crate) struct ChannelStream {
 }
 
 impl ChannelStream {
-    /// The channel in the form required by a stand.
-    pub(crate) fn channel(&self) -> RecordedChannel<'_> {
-        RecordedChannel {
-            name: &self.name,
-            unit: self.unit.as_ref(),
-            unit_text: self.unit_text.as_deref(),
-        }
-    }
-
     /// Opens a file and finds the channel and its time axis.
     ///
     /// # Errors
@@ -146,16 +126,11 @@ impl ChannelStream {
         };
         Ok(Self {
             dialect: first_rows.dialect.clone(),
-            is_compensated: selection.channel.is_compensated,
-            name: selection.channel.name.clone(),
-            unit: selection.unit,
-            unit_text: selection.channel.unit_text.clone(),
             rate_hz: time.rate_hz.unwrap_or(selection.rate_hz),
             start: time.start.unwrap_or_default(),
-            time,
+            channel: selection.on_axis(time, Vec::new()),
             origin: None,
             any_steps: reading.any_steps,
-            filled: Vec::new(),
             warnings: [first_rows.warnings.clone(), selection.warnings].concat(),
             blocks: Box::new(TextBlocks {
                 source: first_rows.source.clone(),
@@ -181,7 +156,7 @@ impl ChannelStream {
             self.source,
             self.blocks.row_kind(),
             self.text,
-            self.time,
+            self.channel.axis,
             self.warnings,
             self.any_steps,
         );

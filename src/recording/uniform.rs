@@ -34,8 +34,8 @@ impl UniformStream {
     /// If the rate is invalid.
     pub(crate) fn of(stream: ChannelStream) -> Result<Self, Failure> {
         let (rate_hz, start) = (stream.rate_hz, stream.start);
-        let rate_std_hz = stream.time.rate_std_hz;
-        let grid = stream.time.grid.clone();
+        let rate_std_hz = stream.channel.axis.rate_std_hz;
+        let grid = stream.channel.axis.grid.clone();
         let is_resampled = grid.as_ref().is_some_and(|grid| grid.resampled);
         let resampler = is_resampled.then(|| Resampler::new(1.0 / rate_hz));
         let resampler = resampler.transpose()?;

@@ -142,7 +142,7 @@ impl Messages {
         })?;
         let added = Added {
             topic: topic.clone(),
-            name: plan.stream.name.clone(),
+            name: plan.stream.channel.name.clone(),
             encoding,
         };
         let name = output.name().to_owned();

@@ -93,7 +93,7 @@ pub(super) fn run(
     } = plan;
     let half_length = filter.half_length();
     let rate_hz = stream.rate_hz;
-    let grid = stream.time.grid.clone();
+    let grid = stream.channel.axis.grid.clone();
     let grid = grid.as_ref();
     let convolver = BlockConvolver::new(&filter);
     let noise_block = convolver.block_length().min(LONGEST_NOISE_BLOCK);
