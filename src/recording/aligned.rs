@@ -251,6 +251,22 @@ fn note_worst(worst: &mut Resampled, done: &Resampled) {
     worst.largest_jitter = worst.largest_jitter.max(done.largest_jitter);
 }
 
+impl Selection<'_> {
+    /// The channel with these samples on another axis, in the unit of the selection.
+    pub(super) fn on_axis(&self, axis: TimeAxis, samples: Vec<f64>) -> Channel {
+        Channel {
+            name: self.channel.name.clone(),
+            heading: self.channel.heading.clone(),
+            samples,
+            unit: self.unit.clone(),
+            unit_text: self.channel.unit_text.clone(),
+            is_compensated: self.channel.is_compensated,
+            axis,
+            ..Channel::default()
+        }
+    }
+}
+
 /// The channels with their first samples, which are moved out of the recording, as they may be most of
 /// it.
 fn filled(recording: &mut Recording, empty: Vec<(usize, Channel)>, count: usize) -> Vec<Channel> {

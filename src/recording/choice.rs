@@ -9,9 +9,7 @@ use torqcomp_model::Unit;
 use super::axis::{REVERSED, UNIFORM, falls, step_of};
 use super::moment::Moment;
 use super::text::CELLS_WITH_UNITS;
-use super::{
-    Channel, Hole, HoleKind, RateFrom, Recording, TimeAxis, check_holes, check_size, formats,
-};
+use super::{Channel, Hole, HoleKind, RateFrom, Recording, check_holes, check_size, formats};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading, already_compensated};
 use crate::print::{enumeration, list, plural};
@@ -263,22 +261,6 @@ pub(crate) struct Selection<'a> {
     pub(crate) unit: Option<NamedUnit>,
     /// Contradictions between command line and file.
     pub(crate) warnings: Vec<Warning>,
-}
-
-impl Selection<'_> {
-    /// The channel with these samples on another axis, in the unit of the selection.
-    pub(super) fn on_axis(&self, axis: TimeAxis, samples: Vec<f64>) -> Channel {
-        Channel {
-            name: self.channel.name.clone(),
-            heading: self.channel.heading.clone(),
-            samples,
-            unit: self.unit.clone(),
-            unit_text: self.channel.unit_text.clone(),
-            is_compensated: self.channel.is_compensated,
-            axis,
-            ..Channel::default()
-        }
-    }
 }
 
 impl Recording {

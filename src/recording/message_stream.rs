@@ -50,9 +50,8 @@ impl ChannelStream {
         let Some(&origin_ns) = times_ns.first() else {
             return Err(nothing_usable(&name, source));
         };
-        let channel = messages::name(&chosen);
         let of_file = messages::unit(&chosen);
-        let (unit, warning) = choice::unit_of(choice, &channel, of_file.as_ref())?;
+        let (unit, warning) = choice::unit_of(choice, &messages::name(&chosen), of_file.as_ref())?;
         let log_offset_ns = source.log_offset_ns();
         let later = later(&source, origin_ns);
         let blocks = MessageBlocks {
@@ -71,12 +70,8 @@ impl ChannelStream {
             rate_hz: time.rate_hz.unwrap_or(f64::NAN),
             start: time.start.unwrap_or_default(),
             channel: Channel {
-                name: channel,
                 unit,
-                unit_text: chosen.unit.as_ref().map(|found| found.unit.clone()),
-                is_compensated: chosen.is_compensated,
-                axis: time,
-                ..Channel::default()
+                ..messages::channel(choice, &chosen, time)
             },
             warnings: warning.into_iter().chain(overridden).collect(),
             any_steps: reading.any_steps,

@@ -53,20 +53,27 @@ pub(super) fn read(
         axis.clock_ns = origin_ns;
         axis.start_text = axis.start.and_then(Moment::date);
         recording.channels.push(Channel {
-            heading: choice.channel.clone().unwrap_or_else(|| name(&selected)),
-            name: name(&selected),
-            unit: unit(&selected),
-            unit_text: selected.unit.as_ref().map(|found| found.unit.clone()),
             samples,
-            axis,
-            is_compensated: selected.is_compensated,
-            ..Channel::default()
+            ..channel(choice, &selected, axis)
         });
     }
     if let Some(range) = &reading.range {
         recording.keep(range).map_err(|f| f.at(input.name()))?;
     }
     Ok(recording)
+}
+
+/// The channel of a number, without its samples.
+pub(super) fn channel(choice: &ChannelChoice, of: &SelectedSignal, axis: TimeAxis) -> Channel {
+    Channel {
+        heading: choice.channel.clone().unwrap_or_else(|| name(of)),
+        name: name(of),
+        unit: unit(of),
+        unit_text: of.unit.as_ref().map(|found| found.unit.clone()),
+        axis,
+        is_compensated: of.is_compensated,
+        ..Channel::default()
+    }
 }
 
 /// Times and values of a number.
