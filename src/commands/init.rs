@@ -38,7 +38,7 @@ const SECTIONS: [(&str, &str); 6] = [
 pub fn run(args: &Init) -> Result<Outcome, Failure> {
     let (mut input, mut errors) = (std::io::stdin().lock(), std::io::stderr());
     let can_ask = input.is_terminal() && errors.is_terminal();
-    let mut asked = can_ask.then(|| Dialogue {
+    let mut asked = can_ask.then_some(Dialogue {
         input: &mut input,
         output: &mut errors,
     });

@@ -101,7 +101,7 @@ fn known(name: &str, there: &[String]) -> String {
     let shown = there[..there.len().min(SHOWN)].join(", ");
     match there.len() {
         0 => format!("{meant}; none has a name"),
-        ..=SHOWN => format!("{meant}; there are: {shown}"),
+        1..=SHOWN => format!("{meant}; there are: {shown}"),
         _ => format!("{meant}; there are: {shown} and more"),
     }
 }
