@@ -45,7 +45,7 @@ const MADE: &str = "made";
 /// Status of a recording whose results were there.
 const SKIPPED: &str = "skipped";
 
-/// A recording in the document of a run.
+/// What became of a recording.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub(super) struct Treated {
     /// `made` (processed, successfully or not), or `skipped`: the results existed.

@@ -32,6 +32,7 @@ pub enum InitFrom {
 ///
 /// Asks for what is not given when it runs on a terminal; in a script the flags say it.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Stand")]
 pub struct Init {
     /// What there is to start from
     #[arg(long, value_enum, help_heading = "Method")]
