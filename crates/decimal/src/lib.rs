@@ -10,6 +10,6 @@ mod span;
 mod text;
 
 pub use digits::Digits;
-pub use pair::{Pair, PairFormat};
+pub use pair::{NumberPair, PairFormat};
 pub use span::Span;
 pub use text::Text;

@@ -32,7 +32,7 @@ pub struct PairFormat {
 
 /// Two numbers read.
 #[derive(Debug)]
-pub struct Pair {
+pub struct NumberPair {
     /// Both numbers: exact, except for the copied one, which may be one unit of its last bit off.
     pub values: [f64; 2],
     /// Where the copied one is.
@@ -87,7 +87,7 @@ impl PairFormat {
 
     /// The numbers at `text[at..]`, if they have this format. What follows the second is not checked.
     #[must_use]
-    pub fn read(&self, text: &[u8], at: usize) -> Option<Pair> {
+    pub fn read(&self, text: &[u8], at: usize) -> Option<NumberPair> {
         let [first, second] = &self.numbers;
         let (first, first_end) = first.read(text, at, self.decimal)?;
         if *text.get(first_end)? != self.separator {
@@ -106,7 +106,7 @@ impl PairFormat {
             ),
             None => ([first.exactly()?, second.exactly()?], Span::default()),
         };
-        Some(Pair {
+        Some(NumberPair {
             values,
             copied,
             end,

@@ -23,7 +23,7 @@ use num_complex::Complex64;
 use torqcomp_model::Covariance;
 
 use super::mode::all_or_none;
-use super::{FitQuality, Identification, ModalPole};
+use super::{Identification, ModalPole};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::rounded;
 use blocks::Set;
@@ -159,11 +159,7 @@ fn evaluate(
         present::add_shares(&mut result);
     }
     check::doubts(&mut result, &fitted, leads);
-    result.fit = Some(FitQuality {
-        rms: present::output_rms(&set, &lines) * fitted.relative,
-        unit: String::new(),
-        relative: fitted.relative,
-    });
+    result.fit = Some(present::quality(&set, &lines, &fitted));
     result.held_out_errors = match fitted.modal.delay_s == 0.0 || is_asked {
         true => held_out,
         false => order::of_given(&set, &lines, options, &fitted.modal)?,

@@ -8,7 +8,7 @@ use super::lines::Lines;
 use super::order::folds;
 use super::{FinalFit, Modal, ResponseOptions, foreign};
 use crate::chart::{Chart, Series};
-use crate::identify::{Comparison, Identification, NamedEstimate};
+use crate::identify::{Comparison, FitQuality, Identification, NamedEstimate};
 use crate::print::{plural, relative, rounded, short};
 
 /// Adds natural frequency and damping ratio of every mode of the stand, in ascending order of
@@ -99,8 +99,8 @@ pub(super) fn other_constants(
     }
 }
 
-/// RMS of the measured signal in the band, over all blocks.
-pub(super) fn output_rms(set: &Set, lines: &Lines) -> f64 {
+/// How well a model follows the measured signal in the band, in the rms over all blocks.
+pub(super) fn quality(set: &Set, lines: &Lines, fitted: &FinalFit) -> FitQuality {
     let power: f64 = set
         .blocks
         .iter()
@@ -112,7 +112,12 @@ pub(super) fn output_rms(set: &Set, lines: &Lines) -> f64 {
         })
         .sum();
     let length = 2.0 * (set.lines as f64 - 1.0);
-    (2.0 * power / set.blocks.len() as f64).sqrt() / length
+    let rms = (2.0 * power / set.blocks.len() as f64).sqrt() / length;
+    FitQuality {
+        rms: rms * fitted.relative,
+        unit: String::new(),
+        relative: fitted.relative,
+    }
 }
 
 /// Adds results of the response itself: its error, its levels, its plots.

@@ -5,7 +5,7 @@
 //! expected, all digits of a run at once. A row that differs is parsed normally and becomes the
 //! next template. Both give bitwise equal results.
 
-use torqcomp_decimal::{Pair, PairFormat};
+use torqcomp_decimal::{NumberPair, PairFormat};
 
 use super::rows::{ColumnKind, RowPlan};
 use crate::recording::text::dialect::Delimiter;
@@ -48,7 +48,12 @@ impl RowTemplate {
 
     /// The row at `at`, if it has the format of the preceding one, and the start of the next line.
     #[inline]
-    pub(super) fn row(&mut self, text: &[u8], at: usize, plan: &RowPlan) -> Option<(Pair, usize)> {
+    pub(super) fn row(
+        &mut self,
+        text: &[u8],
+        at: usize,
+        plan: &RowPlan,
+    ) -> Option<(NumberPair, usize)> {
         let pair = self.format.as_ref()?.read(text, at)?;
         let end = plan.row_end(text, pair.end)?;
         self.followed += 1;
