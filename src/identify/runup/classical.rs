@@ -16,9 +16,9 @@ const ORDER: u32 = 4;
 /// needs no differences.
 pub(super) fn identify(
     run: &FreeRun,
-    is_both: bool,
+    standing: &[bool],
+    (is_both, split): (bool, bool),
     half: usize,
-    split: bool,
     names: &[(&'static str, &'static str)],
 ) -> Result<Option<Comparison>, Failure> {
     if run.kind == Motion::Acceleration {
@@ -31,7 +31,8 @@ pub(super) fn identify(
     let count = run.motion.len();
     // Without the ends, where differences and filters are inexact.
     let edge = (2 * half).min(count / 10);
-    let rows: Vec<usize> = (edge..count - edge).step_by(step).collect();
+    let moves = |r: &usize| !standing[*r];
+    let rows: Vec<usize> = (edge..count - edge).step_by(step).filter(moves).collect();
     let columns = columns(run, (is_both, split), &rows, smooth)?;
     let design = DMatrix::from_fn(rows.len(), columns.len(), |r, c| columns[c][r]);
     let right = at(&rows, &smooth(run.effort)?);

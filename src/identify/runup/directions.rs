@@ -1,7 +1,9 @@
 //! Direction of motion at each sample, and where it is uncertain.
 
-use torqcomp_dsp::weak::{Window, white_noise_variance};
+use statrs::distribution::{ContinuousCDF, Normal};
+use torqcomp_dsp::weak::Window;
 
+use super::resolution::noise_variance;
 use super::turns::{Speeds, Turn};
 use super::{FreeRun, SHORTEST_HALF};
 use crate::failure::Failure;
@@ -23,6 +25,11 @@ pub(in crate::identify) struct Directions {
     /// Whether the body stops, reverses or moves too slowly at a sample, or within the smoothing of the speed
     /// around it.
     pub unsure: Vec<bool>,
+    /// Whether the body is at rest at a sample as far as the noise shows, or within that smoothing: dry friction then
+    /// balances whatever acts.
+    pub standing: Vec<bool>,
+    /// Variance of the noise of the motion while the body moves.
+    pub noise_variance: f64,
     forward: bool,
     backward: bool,
 }
@@ -39,13 +46,16 @@ impl Directions {
                 speed: None,
                 sign: vec![1.0; count],
                 unsure: vec![false; count],
+                standing: vec![false; count],
+                noise_variance: noise_variance(run.motion),
                 forward: true,
                 backward: false,
             });
         }
         let half = SHORTEST_HALF.max(count / 2000).min(20);
         let (speed, mut sign) = smoothed(run, half)?;
-        let share = |s: f64| sign.iter().filter(|v| **v == s).count() as f64 / count as f64;
+        let moves = sign.iter().filter(|v| v.abs() == 1.0).count() as f64;
+        let share = |s: f64| sign.iter().filter(|v| **v == s).count() as f64 / moves;
         let (forward, backward) = (share(1.0) > DIRECTION, share(-1.0) > DIRECTION);
         let speeds = Speeds {
             motion: run.motion,
@@ -53,19 +63,25 @@ impl Directions {
             reach: 2 * half,
         };
         let uncertain = uncertain(&sign);
-        let mut unsure = vec![false; count];
+        let [mut unsure, mut standing] = [(); 2].map(|()| vec![false; count]);
         for (from, to) in uncertain {
             let (first, last) = (from.saturating_sub(half), (to + half).min(count - 1));
             unsure[first..=last].fill(true);
             // An opposite direction afterwards means that it reversed or stopped in between.
-            let turns = from > 0 && to < count && sign[from - 1] * sign[to.min(count - 1)] < 0.0;
-            if turns && let Turn::At(place) = speeds.turn(from.saturating_sub(NEAR), to + NEAR) {
+            let turns = from > 0 && to < count && sign[from - 1] * sign[to] < 0.0;
+            let turn = turns.then(|| speeds.turn(from.saturating_sub(NEAR), to + NEAR));
+            if let Some(Turn::At(place)) = turn {
                 let way = sign[from - 1];
                 step(&mut sign, way, place, first, last);
+            } else if from < to {
+                standing[first..=last].fill(true);
             }
         }
+        let noise_variance = noise_variance(&moving(run.motion, &standing));
         Ok(Self {
             unsure,
+            standing,
+            noise_variance,
             sign,
             speed: Some(speed),
             forward,
@@ -73,10 +89,25 @@ impl Directions {
         })
     }
 
+    /// Where the body stands, without the rest, which takes much memory.
+    pub fn into_standing(self) -> Vec<bool> {
+        self.standing
+    }
+
+    /// The samples in which the body moves.
+    pub fn moving(&self, samples: &[f64]) -> Vec<f64> {
+        moving(samples, &self.standing)
+    }
+
     /// Whether the body moved in both directions.
     pub fn both(&self) -> bool {
         self.forward && self.backward
     }
+}
+
+fn moving(samples: &[f64], standing: &[bool]) -> Vec<f64> {
+    let pairs = samples.iter().zip(standing);
+    pairs.filter(|(_, s)| !**s).map(|(v, _)| *v).collect()
 }
 
 /// Speed at every sample, and its sign, proportional to the speed within the noise.
@@ -88,12 +119,33 @@ fn smoothed(run: &FreeRun, half: usize) -> Result<(Vec<f64>, Vec<f64>), Failure>
     let (first, last) = (speed[0], speed[speed.len() - 1]);
     speed.splice(0..0, vec![first; half]);
     speed.resize(count, last);
-    let variance = white_noise_variance(run.motion).unwrap_or(0.0);
-    let noise = (variance * window.noise(order, order)).sqrt();
+    let noise = (noise_variance(run.motion) * window.noise(order, order)).sqrt();
     let largest = speed.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     let dead = (3.0 * noise).max(1e-9 * largest);
-    let sign = speed.iter().map(|v| (v / dead).clamp(-1.0, 1.0)).collect();
+    let sign = signs(&speed, dead, chauvenet(count) * noise);
     Ok((speed, sign))
+}
+
+/// Sign of each speed, proportional to it below `dead`. Noise exceeds that now and then in a long rest, so a stretch
+/// beyond it counts only if it reaches `least` somewhere.
+fn signs(speed: &[f64], dead: f64, least: f64) -> Vec<f64> {
+    let way = |v: f64| (v / dead).clamp(-1.0, 1.0).trunc();
+    let stretches = speed.chunk_by(|a, b| way(*a) == way(*b));
+    let of = |stretch: &[f64]| -> Vec<f64> {
+        let most = stretch.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let full = if most < least { least.max(dead) } else { dead };
+        stretch
+            .iter()
+            .map(|v| (v / full).clamp(-1.0, 1.0))
+            .collect()
+    };
+    stretches.flat_map(of).collect()
+}
+
+/// Standard deviations beyond which half of one normal value in `count` is expected (W. Chauvenet, A Manual
+/// of Spherical and Practical Astronomy, 1863, II, 558): 3 for 185, 3.5 for 1100.
+pub(super) fn chauvenet(count: usize) -> f64 {
+    Normal::standard().inverse_cdf(1.0 - 0.25 / count.max(1) as f64)
 }
 
 /// Intervals of uncertain direction: the first sample, and the first one after. Between two samples of opposite

@@ -14,6 +14,7 @@ mod classical;
 mod directions;
 mod present;
 mod regression;
+mod resolution;
 mod scatter;
 mod turns;
 mod windows;
@@ -115,13 +116,14 @@ pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification,
         relative: left / rms(&fitted.rows.right),
     });
     result.method.extend(wrapped::method(wraps));
-    present::method(&mut result, run, &fitted);
+    present::method(&mut result, run, &directions, &fitted);
     present::draw(&mut result, run, &fitted);
     present::warnings(&mut result, run, &directions, options, &fitted);
     let is_both = directions.both();
     // The comparison takes the most memory.
-    drop((directions, fitted));
-    let classical = classical::identify(run, is_both, half, split, &names)?;
+    drop(fitted);
+    let standing = directions.into_standing();
+    let classical = classical::identify(run, &standing, (is_both, split), half, &names)?;
     result.comparisons.extend(classical);
     Ok(result)
 }

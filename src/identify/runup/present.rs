@@ -1,6 +1,7 @@
 //! Names, method, charts and warnings of a run-up.
 
 use super::directions::Directions;
+use super::resolution::too_few;
 use super::windows::FittedRows;
 use super::{COLOURED, FreeRun, RunupOptions};
 use crate::chart::{Chart, Series};
@@ -34,9 +35,21 @@ pub(super) fn names(
 }
 
 /// Describes the evaluation of the run.
-pub(super) fn method(result: &mut Identification, run: &FreeRun, fitted: &FittedRows) {
+pub(super) fn method(
+    result: &mut Identification,
+    run: &FreeRun,
+    directions: &Directions,
+    fitted: &FittedRows,
+) {
     let all = fitted.used.len();
     let used = fitted.used.iter().filter(|u| **u).count();
+    let rest = directions.standing.iter().filter(|s| **s).count();
+    if rest > 0 {
+        result.method.push(format!(
+            "the body is at rest, as far as the noise of the motion shows, for {} s in all; windows there were left out",
+            short(rest as f64 / run.rate_hz)
+        ));
+    }
     let which = if used < all {
         format!("{used} of {all} windows; in the others the body reverses or is at rest")
     } else {
@@ -108,6 +121,7 @@ pub(super) fn warnings(
              offset, dry_friction ± offset is the dry friction in each direction",
         );
     }
+    coarse(result, run, directions, fitted);
     if fitted.fit.noise_share > NOISY {
         result.warn(
             "noisy-motion",
@@ -121,6 +135,43 @@ pub(super) fn warnings(
     impossible(result);
     shifted(result, fitted);
     poor(result);
+}
+
+/// Warns about windows shorter than a few new values of a channel.
+fn coarse(
+    result: &mut Identification,
+    run: &FreeRun,
+    directions: &Directions,
+    fitted: &FittedRows,
+) {
+    let Some(few) = too_few(&directions.moving(run.motion), run.effort, fitted.rows.half) else {
+        return;
+    };
+    let time_s = |samples: usize| short(samples as f64 / run.rate_hz);
+    let (code, why, remedy) = if few.is_held {
+        (
+            "repeated-samples",
+            "they are held",
+            "record at the rate of their source",
+        )
+    } else {
+        (
+            "coarse-quantisation",
+            "of its coarse resolution",
+            "record with a finer resolution",
+        )
+    };
+    result.warn(
+        code,
+        format!(
+            "most values of the {} stay for {} s because {why}, too long for windows of ±{} s: their errors do not average \
+             out, and the constants may be wrong by more than their uncertainty; {remedy}, or for longer with a longer \
+             --window",
+            few.channel,
+            time_s(few.every),
+            time_s(fitted.rows.half)
+        ),
+    );
 }
 
 /// Warns about channels that are shifted in time, with the constants that would allow for it.

@@ -66,7 +66,11 @@ pub(super) fn solve(
         rows as f64 * (errors.noise)(i, j) / (sizes[i] * sizes[j])
     });
     let noise_share = (0..count).map(|i| part[(i, i)]).fold(0.0, f64::max);
-    let inverse = (scaled.tr_mul(&scaled) - part)
+    let gram = scaled.tr_mul(&scaled);
+    if worst_share(&gram, &part).is_none_or(|share| share > most_noise(rows)) {
+        return Err(not_identifiable());
+    }
+    let inverse = (gram - part)
         .cholesky()
         .ok_or_else(not_identifiable)?
         .inverse();
@@ -83,6 +87,24 @@ pub(super) fn solve(
         noise_share,
         coloured,
     })
+}
+
+/// Noise power in the combination of columns that has the largest share of it; `None` if a combination is zero.
+///
+/// Under one constant torque the combination `J θ'' + f θ' − T` is all noise: whatever the constants are, its multiples
+/// may be added to them. Each term alone may be a thousand times its noise.
+fn worst_share(gram: &DMatrix<f64>, noise: &DMatrix<f64>) -> Option<f64> {
+    let lower = gram.clone().cholesky()?.l();
+    let half = lower.solve_lower_triangular(noise)?;
+    let whitened = lower.solve_lower_triangular(&half.transpose())?;
+    Some(whitened.symmetric_eigenvalues().max())
+}
+
+/// Largest share of noise with which a combination is known: half, or less where the rows are too few to tell its power
+/// from that of noise. That of noise scatters by `√(2/(rows/2))` of itself, as about two rows share their errors; six
+/// times this is never by chance.
+fn most_noise(rows: usize) -> f64 {
+    1.0 / (1.0 + 12.0 / (rows as f64).sqrt()).max(2.0)
 }
 
 /// Left-hand side minus right-hand side of each row.
@@ -105,7 +127,8 @@ pub(super) fn left_side(columns: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
 fn not_identifiable() -> Failure {
     Failure::failed(
         ErrorCode::NotIdentifiable,
-        "the terms of the equation of motion are not separately identifiable from this record: it needs speeds and \
-         accelerations that vary, and less noise",
+        "the terms of the equation of motion are not separately identifiable from this record: at one constant torque, \
+         or coasting alone, any multiple of inertia and friction fits; the torque must vary, with speeds and \
+         accelerations that stand out of the noise",
     )
 }

@@ -1,11 +1,11 @@
 //! Equation of motion averaged over windows: one row per window, one column per term.
 
-use statrs::distribution::{ContinuousCDF, Normal};
-use torqcomp_dsp::weak::{Window, white_noise_variance};
+use torqcomp_dsp::weak::Window;
 
-use super::directions::Directions;
+use super::directions::{Directions, chauvenet};
 use super::present::names;
 use super::regression::{Corrected, Errors, left_side, solve};
+use super::resolution::shortest_half;
 use super::{COLOURED, FreeRun, LEAST_WINDOWS, SHORTEST_HALF};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::rms;
@@ -23,6 +23,8 @@ pub(super) struct WindowRows {
     pub right: Vec<f64>,
     /// Its derivative, per second.
     slope: Vec<f64>,
+    /// Whether the body moves throughout a window, reversing or not.
+    pub moves: Vec<bool>,
     /// Whether the body moves one way throughout a window.
     pub clean: Vec<bool>,
     /// Derivative order of each column, if its noise is known.
@@ -58,12 +60,18 @@ impl WindowRows {
         let stride = (half / 2).max(1);
         let count = run.motion.len();
         let centres: Vec<usize> = (half..count.saturating_sub(half)).step_by(stride).collect();
-        if centres.len() < LEAST_WINDOWS {
+        let none = |of: &[bool]| -> Vec<bool> {
+            let free = |c: &usize| !of[c - half..=c + half].contains(&true);
+            centres.iter().map(free).collect()
+        };
+        let moves = none(&directions.standing);
+        let places = moves.iter().filter(|m| **m).count();
+        if places < LEAST_WINDOWS {
             return Err(Failure::failed(
                 ErrorCode::TooFewSamples,
                 format_args!(
-                    "the record has only {} for windows of ±{half} samples; choose a shorter --window",
-                    plural(centres.len(), "place")
+                    "the body moves throughout only {} for windows of ±{half} samples; choose a shorter --window",
+                    plural(places, "place")
                 ),
             ));
         }
@@ -73,30 +81,30 @@ impl WindowRows {
         };
         let (columns, orders) = terms(run, directions, split, centres.len(), &column);
         let names = names(run, directions, split).into_iter();
-        let sure = |c: &usize| !directions.unsure[c - half..=c + half].contains(&true);
         Ok(Self {
             half,
             stride,
             columns,
             right: column(run.effort, 0),
             slope: column(run.effort, 1),
-            clean: centres.iter().map(sure).collect(),
+            clean: none(&directions.unsure),
+            moves,
             orders,
             names: names.map(|(name, _)| name).collect(),
             window: window.clone(),
-            variance: white_noise_variance(run.motion).unwrap_or(0.0),
+            variance: directions.noise_variance,
         })
     }
 
     /// Whether there are enough windows in which the body moves one way.
     fn enough_clean(&self) -> bool {
-        let clean = self.clean.iter().filter(|c| **c).count();
-        clean >= LEAST_WINDOWS && 3 * clean >= self.clean.len()
+        let [clean, moving] =
+            [&self.clean, &self.moves].map(|of| of.iter().filter(|w| **w).count());
+        clean >= LEAST_WINDOWS && 3 * clean >= moving
     }
 
     /// The clean windows and, where the residual of the clean ones is more than noise, those others that follow the
-    /// same equation as closely. At a stop, dry friction balances whatever acts, which the equation does not
-    /// describe. A reversal is located to a few hundredths of a sample at best, which may be more than the noise:
+    /// same equation as closely, except at rest, where dry friction balances whatever acts. A reversal is located to a few hundredths of a sample at best, which may be more than the noise:
     /// such windows would bias the result by more than its uncertainty due to noise, but by no more than that
     /// uncertainty after its increase for an incomplete model.
     fn following(&self, fit: &Corrected) -> Vec<bool> {
@@ -110,7 +118,7 @@ impl WindowRows {
             .collect();
         let most = chauvenet(self.clean.len()) * rms(&clean);
         (0..self.clean.len())
-            .map(|k| self.clean[k] || residual(k).abs() <= most)
+            .map(|k| self.clean[k] || self.moves[k] && residual(k).abs() <= most)
             .collect()
     }
 
@@ -146,8 +154,8 @@ impl WindowRows {
     /// # Errors
     /// If the terms are not separately identifiable.
     pub fn fit(self) -> Result<FittedRows, Failure> {
-        let mut used = vec![true; self.clean.len()];
-        if self.enough_clean() && self.clean.contains(&false) {
+        let mut used = self.moves.clone();
+        if self.enough_clean() && self.clean != self.moves {
             // The clean windows alone may not determine all terms.
             if let Ok(fit) = self.solve(&self.clean) {
                 used = self.following(&fit);
@@ -196,6 +204,7 @@ impl FittedRows {
             names: [&rows.names[..], &["delay"]].concat(),
             right: rows.right.clone(),
             slope: Vec::new(),
+            moves: Vec::new(),
             clean: Vec::new(),
             window: rows.window.clone(),
             ..*rows
@@ -221,12 +230,6 @@ impl FittedRows {
         let is_clear = seconds.abs() > CLEAR_SHIFT * std_s;
         (is_clear && (is_less || moves)).then_some(LateChannel { seconds, values })
     }
-}
-
-/// Standard deviations beyond which half of one normal value in `count` is expected (W. Chauvenet, A Manual
-/// of Spherical and Practical Astronomy, 1863, II, 558): 3 for 185, 3.5 for 1100.
-fn chauvenet(count: usize) -> f64 {
-    Normal::standard().inverse_cdf(1.0 - 0.25 / count.max(1) as f64)
 }
 
 /// Terms of the equation of motion, with the order of the derivative of the motion in each.
@@ -283,11 +286,14 @@ fn integral(samples: &[f64], rate_hz: f64) -> Vec<f64> {
 /// Half-length of the first window at which the result changes least: shorter ones are noisy, longer ones average over
 /// deviations from the equation. Always determined with one viscous friction.
 pub(super) fn plateau(run: &FreeRun, directions: &Directions) -> usize {
-    let longest = (run.motion.len() / (LEAST_WINDOWS / 2 + 2)).max(SHORTEST_HALF);
+    let moving = directions.standing.iter().filter(|s| !**s).count();
+    let longest = moving / (LEAST_WINDOWS / 2 + 2);
+    let shortest =
+        shortest_half(&directions.moving(run.motion), run.effort).min(longest.max(SHORTEST_HALF));
     let mut halves = Vec::new();
     let mut changes: Vec<f64> = Vec::new();
     let mut last: Option<Tried> = None;
-    let mut half = SHORTEST_HALF;
+    let mut half = shortest;
     while half <= longest {
         let fitted = WindowRows::of(run, directions, half, false).and_then(WindowRows::fit);
         if let Ok(fitted) = fitted {
@@ -304,7 +310,7 @@ pub(super) fn plateau(run: &FreeRun, directions: &Directions) -> usize {
         half = half * 3 / 2;
     }
     let best = changes.len().saturating_sub(1);
-    halves.get(best).copied().unwrap_or(SHORTEST_HALF)
+    halves.get(best).copied().unwrap_or(shortest)
 }
 
 /// The part of a fit needed for comparison with the next one.
