@@ -9,6 +9,7 @@ mod late_channels;
 mod response;
 mod runup;
 mod short_hits;
+mod spins;
 mod static_load;
 mod transients;
 mod traps;

@@ -16,7 +16,7 @@ const ORDER: u32 = 4;
 /// needs no differences.
 pub(super) fn identify(
     run: &FreeRun,
-    standing: &[bool],
+    moves: &[bool],
     (is_both, split): (bool, bool),
     half: usize,
     names: &[(&'static str, &'static str)],
@@ -31,8 +31,10 @@ pub(super) fn identify(
     let count = run.motion.len();
     // Without the ends, where differences and filters are inexact.
     let edge = (2 * half).min(count / 10);
-    let moves = |r: &usize| !standing[*r];
-    let rows: Vec<usize> = (edge..count - edge).step_by(step).filter(moves).collect();
+    let rows: Vec<usize> = (edge..count - edge)
+        .step_by(step)
+        .filter(|r| moves[*r])
+        .collect();
     let columns = columns(run, (is_both, split), &rows, smooth)?;
     let design = DMatrix::from_fn(rows.len(), columns.len(), |r, c| columns[c][r]);
     let right = at(&rows, &smooth(run.effort)?);

@@ -25,9 +25,9 @@ pub(in crate::identify) struct Directions {
     /// Whether the body stops, reverses or moves too slowly at a sample, or within the smoothing of the speed
     /// around it.
     pub unsure: Vec<bool>,
-    /// Whether the body is at rest at a sample as far as the noise shows, or within that smoothing: dry friction then
-    /// balances whatever acts.
-    pub standing: Vec<bool>,
+    /// Whether the body moves at a sample and within the smoothing around it, as far as the noise shows. At rest, dry
+    /// friction balances whatever acts.
+    pub moves: Vec<bool>,
     /// Variance of the noise of the motion while the body moves.
     pub noise_variance: f64,
     forward: bool,
@@ -46,7 +46,7 @@ impl Directions {
                 speed: None,
                 sign: vec![1.0; count],
                 unsure: vec![false; count],
-                standing: vec![false; count],
+                moves: vec![true; count],
                 noise_variance: noise_variance(run.motion),
                 forward: true,
                 backward: false,
@@ -63,7 +63,7 @@ impl Directions {
             reach: 2 * half,
         };
         let uncertain = uncertain(&sign);
-        let [mut unsure, mut standing] = [(); 2].map(|()| vec![false; count]);
+        let (mut unsure, mut moves) = (vec![false; count], vec![true; count]);
         for (from, to) in uncertain {
             let (first, last) = (from.saturating_sub(half), (to + half).min(count - 1));
             unsure[first..=last].fill(true);
@@ -74,13 +74,13 @@ impl Directions {
                 let way = sign[from - 1];
                 step(&mut sign, way, place, first, last);
             } else if from < to {
-                standing[first..=last].fill(true);
+                moves[first..=last].fill(false);
             }
         }
-        let noise_variance = noise_variance(&moving(run.motion, &standing));
+        let noise_variance = noise_variance(&chosen(run.motion, &moves));
         Ok(Self {
             unsure,
-            standing,
+            moves,
             noise_variance,
             sign,
             speed: Some(speed),
@@ -89,14 +89,14 @@ impl Directions {
         })
     }
 
-    /// Where the body stands, without the rest, which takes much memory.
-    pub fn into_standing(self) -> Vec<bool> {
-        self.standing
+    /// The samples at which the body moves, without what takes more memory.
+    pub fn into_moves(self) -> Vec<bool> {
+        self.moves
     }
 
     /// The samples in which the body moves.
     pub fn moving(&self, samples: &[f64]) -> Vec<f64> {
-        moving(samples, &self.standing)
+        chosen(samples, &self.moves)
     }
 
     /// Whether the body moved in both directions.
@@ -105,9 +105,10 @@ impl Directions {
     }
 }
 
-fn moving(samples: &[f64], standing: &[bool]) -> Vec<f64> {
-    let pairs = samples.iter().zip(standing);
-    pairs.filter(|(_, s)| !**s).map(|(v, _)| *v).collect()
+/// The chosen values.
+pub(super) fn chosen(values: &[f64], which: &[bool]) -> Vec<f64> {
+    let pairs = values.iter().zip(which);
+    pairs.filter(|(_, is)| **is).map(|(v, _)| *v).collect()
 }
 
 /// Speed at every sample, and its sign, proportional to the speed within the noise.

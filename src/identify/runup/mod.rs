@@ -109,11 +109,11 @@ pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification,
     let mut result = Identification::new("runup");
     let names = present::names(run, &directions, split);
     result.add(NamedEstimates::new(&names, &fitted.fit.numbers));
-    let left = rms(&fitted.fit.residuals);
+    let left = rms(&fitted.moving(&fitted.fit.residuals));
     result.fit = Some(FitQuality {
         rms: left,
         unit: run.body.effort().to_owned(),
-        relative: left / rms(&fitted.rows.right),
+        relative: left / rms(&fitted.moving(&fitted.rows.right)),
     });
     result.method.extend(wrapped::method(wraps));
     present::method(&mut result, run, &directions, &fitted);
@@ -122,8 +122,8 @@ pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification,
     let is_both = directions.both();
     // The comparison takes the most memory.
     drop(fitted);
-    let standing = directions.into_standing();
-    let classical = classical::identify(run, &standing, (is_both, split), half, &names)?;
+    let moves = directions.into_moves();
+    let classical = classical::identify(run, &moves, (is_both, split), half, &names)?;
     result.comparisons.extend(classical);
     Ok(result)
 }

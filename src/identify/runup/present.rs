@@ -43,7 +43,7 @@ pub(super) fn method(
 ) {
     let all = fitted.used.len();
     let used = fitted.used.iter().filter(|u| **u).count();
-    let rest = directions.standing.iter().filter(|s| **s).count();
+    let rest = directions.moves.iter().filter(|m| !**m).count();
     if rest > 0 {
         result.method.push(format!(
             "the body is at rest, as far as the noise of the motion shows, for {} s in all; windows there were left out",

@@ -124,7 +124,7 @@ pub(super) fn left_side(columns: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
     left
 }
 
-fn not_identifiable() -> Failure {
+pub(super) fn not_identifiable() -> Failure {
     Failure::failed(
         ErrorCode::NotIdentifiable,
         "the terms of the equation of motion are not separately identifiable from this record: at one constant torque, \

@@ -2,9 +2,9 @@
 
 use torqcomp_dsp::weak::Window;
 
-use super::directions::{Directions, chauvenet};
+use super::directions::{Directions, chauvenet, chosen};
 use super::present::names;
-use super::regression::{Corrected, Errors, left_side, solve};
+use super::regression::{Corrected, Errors, left_side, not_identifiable, solve};
 use super::resolution::shortest_half;
 use super::{COLOURED, FreeRun, LEAST_WINDOWS, SHORTEST_HALF};
 use crate::failure::{ErrorCode, Failure};
@@ -60,11 +60,11 @@ impl WindowRows {
         let stride = (half / 2).max(1);
         let count = run.motion.len();
         let centres: Vec<usize> = (half..count.saturating_sub(half)).step_by(stride).collect();
-        let none = |of: &[bool]| -> Vec<bool> {
-            let free = |c: &usize| !of[c - half..=c + half].contains(&true);
+        let none = |of: &[bool], wrong: bool| -> Vec<bool> {
+            let free = |c: &usize| !of[c - half..=c + half].contains(&wrong);
             centres.iter().map(free).collect()
         };
-        let moves = none(&directions.standing);
+        let moves = none(&directions.moves, false);
         let places = moves.iter().filter(|m| **m).count();
         if places < LEAST_WINDOWS {
             return Err(Failure::failed(
@@ -87,7 +87,7 @@ impl WindowRows {
             columns,
             right: column(run.effort, 0),
             slope: column(run.effort, 1),
-            clean: none(&directions.unsure),
+            clean: none(&directions.unsure, true),
             moves,
             orders,
             names: names.map(|(name, _)| name).collect(),
@@ -152,7 +152,7 @@ impl WindowRows {
     /// Fits the rows.
     ///
     /// # Errors
-    /// If the terms are not separately identifiable.
+    /// If the terms are not separately identifiable, or no term of the motion has a part in the torque.
     pub fn fit(self) -> Result<FittedRows, Failure> {
         let mut used = self.moves.clone();
         if self.enough_clean() && self.clean != self.moves {
@@ -161,8 +161,18 @@ impl WindowRows {
                 used = self.following(&fit);
             }
         }
+        let fit = self.solve(&used)?;
+        let is_clear = |(k, value): (usize, &f64)| {
+            let std = fit.numbers.covariance().std(k);
+            std.is_some_and(|std| value.abs() > CLEAR * std)
+        };
+        // The last term is the offset: alone, it is any constant torque.
+        let moving = &fit.numbers.values()[..self.columns.len() - 1];
+        if !moving.iter().enumerate().any(is_clear) {
+            return Err(not_identifiable());
+        }
         Ok(FittedRows {
-            fit: self.solve(&used)?,
+            fit,
             rows: self,
             used,
         })
@@ -179,6 +189,8 @@ impl WindowRows {
     }
 }
 
+/// Minimum size of a significant constant in standard uncertainties.
+const CLEAR: f64 = 4.0;
 /// Minimum significant shift in standard uncertainties.
 const CLEAR_SHIFT: f64 = 6.0;
 /// A shift matters if it reduces the residual to less than this fraction, or changes a constant by more than this
@@ -194,6 +206,24 @@ pub(super) struct LateChannel {
 }
 
 impl FittedRows {
+    /// Residual of the used windows relative to the variation of the torque in them.
+    fn unexplained(&self) -> f64 {
+        let mut torque = self.used(&self.rows.right);
+        let mean = torque.iter().sum::<f64>() / torque.len() as f64;
+        torque.iter_mut().for_each(|v| *v -= mean);
+        rms(&self.used(&self.fit.residuals)) / rms(&torque)
+    }
+
+    /// The values of the used windows.
+    fn used(&self, values: &[f64]) -> Vec<f64> {
+        chosen(values, &self.used)
+    }
+
+    /// The values of the windows without rest.
+    pub fn moving(&self, values: &[f64]) -> Vec<f64> {
+        chosen(values, &self.rows.moves)
+    }
+
     /// A shift between the channels, if it matters: `T(t + τ) ≈ T + τ T'`, so that τ is one more coefficient of the
     /// equation.
     pub fn shift(&self) -> Option<LateChannel> {
@@ -214,14 +244,7 @@ impl FittedRows {
         let std = |fit: &Corrected, k: usize| fit.numbers.covariance().std(k);
         let std_s = std(&found, values.len() - 1)?;
         let seconds = -values.pop()?;
-        let left = |fit: &Corrected| {
-            let used = fit
-                .residuals
-                .iter()
-                .zip(&self.used)
-                .filter(|(_, used)| **used);
-            rms(&used.map(|(r, _)| *r).collect::<Vec<f64>>())
-        };
+        let left = |fit: &Corrected| rms(&self.used(&fit.residuals));
         let is_less = left(&found) < MATTERS.0 * left(&self.fit);
         let mut changes = values.iter().zip(self.fit.numbers.values()).enumerate();
         let moves = changes.any(|(k, (new, old))| {
@@ -283,20 +306,39 @@ fn integral(samples: &[f64], rate_hz: f64) -> Vec<f64> {
         .collect()
 }
 
+/// Residual relative to the variation of the torque above which the motion does not explain it.
+const UNEXPLAINED: f64 = 0.3;
+
 /// Half-length of the first window at which the result changes least: shorter ones are noisy, longer ones average over
 /// deviations from the equation. Always determined with one viscous friction.
+///
+/// A window in which the motion does not explain the variation of the torque counts only if there is no other: noise,
+/// ripple or hum of the motion may outweigh its acceleration in short ones, and the constants are then near zero in all
+/// of them.
 pub(super) fn plateau(run: &FreeRun, directions: &Directions) -> usize {
-    let moving = directions.standing.iter().filter(|s| !**s).count();
-    let longest = moving / (LEAST_WINDOWS / 2 + 2);
-    let shortest =
-        shortest_half(&directions.moving(run.motion), run.effort).min(longest.max(SHORTEST_HALF));
+    let moving = directions.moving(run.motion);
+    let longest = moving.len() / (LEAST_WINDOWS / 2 + 2);
+    let mut shortest = shortest_half(&moving, run.effort).min(longest.max(SHORTEST_HALF));
+    // Between rests, there may be no room for it.
+    while shortest > SHORTEST_HALF && WindowRows::of(run, directions, shortest, false).is_err() {
+        shortest = SHORTEST_HALF.max(shortest * 2 / 3);
+    }
     let mut halves = Vec::new();
     let mut changes: Vec<f64> = Vec::new();
     let mut last: Option<Tried> = None;
+    let mut least = (f64::INFINITY, shortest);
     let mut half = shortest;
     while half <= longest {
         let fitted = WindowRows::of(run, directions, half, false).and_then(WindowRows::fit);
-        if let Ok(fitted) = fitted {
+        let left = fitted
+            .as_ref()
+            .map_or(f64::INFINITY, FittedRows::unexplained);
+        if left < least.0 {
+            least = (left, half);
+        }
+        if let Ok(fitted) = fitted
+            && left < UNEXPLAINED
+        {
             let tried = Tried::of(fitted);
             halves.push(half);
             changes.extend(last.map(|last| last.change_to(&tried)));
@@ -310,7 +352,7 @@ pub(super) fn plateau(run: &FreeRun, directions: &Directions) -> usize {
         half = half * 3 / 2;
     }
     let best = changes.len().saturating_sub(1);
-    halves.get(best).copied().unwrap_or(shortest)
+    halves.get(best).copied().unwrap_or(least.1)
 }
 
 /// The part of a fit needed for comparison with the next one.
