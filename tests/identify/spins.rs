@@ -89,18 +89,18 @@ fn evaluated(
     torque: &[f64],
     window_s: Option<f64>,
 ) -> Result<Identification, String> {
-    evaluated_as_recorded(speed, &noisy(torque, 2e-3, 71), window_s)
+    evaluated_as_recorded((speed, Motion::Speed), &noisy(torque, 2e-3, 71), window_s)
 }
 
 fn evaluated_as_recorded(
-    speed: &[f64],
+    (motion, kind): (&[f64], Motion),
     torque: &[f64],
     window_s: Option<f64>,
 ) -> Result<Identification, String> {
     let run = runup::FreeRun {
         rate_hz: RATE_HZ,
-        motion: speed,
-        kind: Motion::Speed,
+        motion,
+        kind,
         effort: torque,
         body: runup::Body::Turning,
     };
@@ -241,6 +241,25 @@ fn steps_of_the_speed_are_averaged_over() {
     assert!(warns(&found, "coarse-quantisation"), "{:?}", found.warnings);
 }
 
+/// Sixty counts a turn, of which one takes up to a few hundred samples.
+#[test]
+fn counts_of_an_encoder_are_no_rests() {
+    let torque = torques(12_000, |t| if t < 6.0 { 0.3 } else { 0.1 });
+    let body = Body {
+        inertia: 0.2,
+        ..LIGHT
+    };
+    let mut angle = 0.0;
+    let count = |w: f64| {
+        angle += w / RATE_HZ;
+        (60.0 * angle / TAU).floor() * TAU / 60.0
+    };
+    let angles: Vec<f64> = body.spin(0.0, &torque).into_iter().map(count).collect();
+    let recorded = noisy(&torque, 2e-3, 73);
+    let found = evaluated_as_recorded((&angles, Motion::Displacement), &recorded, None).unwrap();
+    right(&found, body, 0.02, "counts");
+}
+
 #[test]
 fn a_torque_that_is_held_is_right_if_it_acts_and_late_if_not() {
     let smooth = torques(40_000, |t| {
@@ -253,7 +272,7 @@ fn a_torque_that_is_held_is_right_if_it_acts_and_late_if_not() {
         let recorded = held(&noisy(&smooth, 2e-3, 72));
         let identified = |acts: &[f64], window_s: Option<f64>| {
             let speed = noisy(&LIGHT.spin(0.0, acts), 0.01, 7);
-            evaluated_as_recorded(&speed, &recorded, window_s).unwrap()
+            evaluated_as_recorded((&speed, Motion::Speed), &recorded, window_s).unwrap()
         };
         let late = identified(&smooth, None);
         assert!(

@@ -3,9 +3,9 @@
 use statrs::distribution::{ContinuousCDF, Normal};
 use torqcomp_dsp::weak::Window;
 
-use super::resolution::noise_variance;
+use super::resolution::{noise_variance, stay};
 use super::turns::{Speeds, Turn};
-use super::{FreeRun, SHORTEST_HALF};
+use super::{FreeRun, LEAST_WINDOWS, SHORTEST_HALF};
 use crate::failure::Failure;
 use crate::identify::Motion;
 
@@ -52,7 +52,12 @@ impl Directions {
                 backward: false,
             });
         }
-        let half = SHORTEST_HALF.max(count / 2000).min(20);
+        let mut half = SHORTEST_HALF.max(count / 2000).min(20);
+        if run.kind == Motion::Displacement {
+            // Between two counts of an encoder, the angle stands still.
+            let counts = SHORTEST_HALF / 2 * stay(run.motion);
+            half = half.max(counts.min(count / (2 * LEAST_WINDOWS)));
+        }
         let (speed, mut sign) = smoothed(run, half)?;
         let moves = sign.iter().filter(|v| v.abs() == 1.0).count() as f64;
         let share = |s: f64| sign.iter().filter(|v| **v == s).count() as f64 / moves;

@@ -46,7 +46,7 @@ pub(super) fn method(
     let rest = directions.moves.iter().filter(|m| !**m).count();
     if rest > 0 {
         result.method.push(format!(
-            "the body is at rest, as far as the noise of the motion shows, for {} s in all; windows there were left out",
+            "the body is at rest, as far as the noise of the motion shows, for {} s in all, which were left out",
             short(rest as f64 / run.rate_hz)
         ));
     }
@@ -164,9 +164,9 @@ fn coarse(
     result.warn(
         code,
         format!(
-            "most values of the {} stay for {} s because {why}, too long for windows of ±{} s: their errors do not average \
-             out, and the constants may be wrong by more than their uncertainty; {remedy}, or for longer with a longer \
-             --window",
+            "most values of the {} stay for {} s because {why}, too long for windows of ±{} s: their errors do not \
+             average out, and the constants may be wrong by more than their uncertainty; {remedy}, or for longer with a \
+             longer --window",
             few.channel,
             time_s(few.every),
             time_s(fitted.rows.half)

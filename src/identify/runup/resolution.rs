@@ -48,12 +48,14 @@ pub(super) fn too_few(moving: &[f64], effort: &[f64], half: usize) -> Option<Too
 /// Number of samples for which most values stay, in each channel. A torque may be constant for long: it counts only if
 /// its values are held.
 fn stays(moving: &[f64], effort: &[f64]) -> [(&'static str, usize); 2] {
-    let middle = |samples: &[f64]| {
-        let mut lengths: Vec<f64> = runs(samples).map(|run| run.length as f64).collect();
-        median(&mut lengths).map_or(1, |length| length as usize)
-    };
-    let torque = if is_held(effort) { middle(effort) } else { 1 };
-    [("motion", middle(moving)), ("torque", torque)]
+    let torque = if is_held(effort) { stay(effort) } else { 1 };
+    [("motion", stay(moving)), ("torque", torque)]
+}
+
+/// Number of samples for which most values of a channel stay.
+pub(super) fn stay(samples: &[f64]) -> usize {
+    let mut lengths: Vec<f64> = runs(samples).map(|run| run.length as f64).collect();
+    median(&mut lengths).map_or(1, |length| length as usize)
 }
 
 /// Whether values repeat more often than their resolution explains.

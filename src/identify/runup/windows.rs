@@ -104,9 +104,10 @@ impl WindowRows {
     }
 
     /// The clean windows and, where the residual of the clean ones is more than noise, those others that follow the
-    /// same equation as closely, except at rest, where dry friction balances whatever acts. A reversal is located to a few hundredths of a sample at best, which may be more than the noise:
-    /// such windows would bias the result by more than its uncertainty due to noise, but by no more than that
-    /// uncertainty after its increase for an incomplete model.
+    /// same equation as closely, except at rest, where dry friction balances whatever acts. A reversal is located to a
+    /// few hundredths of a sample at best, which may be more than the noise: such windows would bias the result by more
+    /// than its uncertainty due to noise, but by no more than that uncertainty after its increase for an incomplete
+    /// model.
     fn following(&self, fit: &Corrected) -> Vec<bool> {
         if fit.coloured <= COLOURED {
             return self.clean.clone();
