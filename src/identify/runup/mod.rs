@@ -83,6 +83,8 @@ pub struct RunupOptions {
 
 /// Minimum reported increase of an uncertainty due to autocorrelation.
 const COLOURED: f64 = 1.3;
+/// Residual relative to the torque above which the motion does not explain it.
+const POOR: f64 = 0.3;
 /// Minimum number of windows in a record.
 const LEAST_WINDOWS: usize = 12;
 /// Half of the shortest window tried, in samples.

@@ -3,7 +3,7 @@
 use super::directions::Directions;
 use super::resolution::too_few;
 use super::windows::FittedRows;
-use super::{COLOURED, FreeRun, RunupOptions};
+use super::{COLOURED, FreeRun, POOR, RunupOptions};
 use crate::chart::{Chart, Series};
 use crate::identify::{Identification, Motion};
 use crate::print::{rounded, short};
@@ -205,9 +205,6 @@ fn shifted(result: &mut Identification, fitted: &FittedRows) {
         ),
     );
 }
-
-/// Residual relative to the torque above which the fit is poor.
-const POOR: f64 = 0.3;
 
 /// Warns if the motion does not explain the torque.
 fn poor(result: &mut Identification) {

@@ -89,12 +89,18 @@ pub(super) fn solve(
     })
 }
 
+/// Power of a column of size 1 without its part along the others, below which only rounding is left of it.
+const DEPENDENT: f64 = 1e-13;
+
 /// Noise power in the combination of columns that has the largest share of it; `None` if a combination is zero.
 ///
 /// Under one constant torque the combination `J θ'' + f θ' − T` is all noise: whatever the constants are, its multiples
 /// may be added to them. Each term alone may be a thousand times its noise.
 fn worst_share(gram: &DMatrix<f64>, noise: &DMatrix<f64>) -> Option<f64> {
     let lower = gram.clone().cholesky()?.l();
+    if lower.diagonal().min().powi(2) < DEPENDENT {
+        return None;
+    }
     let half = lower.solve_lower_triangular(noise)?;
     let whitened = lower.solve_lower_triangular(&half.transpose())?;
     Some(whitened.symmetric_eigenvalues().max())

@@ -6,7 +6,7 @@ use super::directions::{Directions, chauvenet, chosen};
 use super::present::names;
 use super::regression::{Corrected, Errors, left_side, not_identifiable, solve};
 use super::resolution::shortest_half;
-use super::{COLOURED, FreeRun, LEAST_WINDOWS, SHORTEST_HALF};
+use super::{COLOURED, FreeRun, LEAST_WINDOWS, POOR, SHORTEST_HALF};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::rms;
 use crate::print::plural;
@@ -169,14 +169,17 @@ impl WindowRows {
         };
         // The last term is the offset: alone, it is any constant torque.
         let moving = &fit.numbers.values()[..self.columns.len() - 1];
-        if !moving.iter().enumerate().any(is_clear) {
-            return Err(not_identifiable());
-        }
-        Ok(FittedRows {
+        let is_told = moving.iter().enumerate().any(is_clear);
+        let fitted = FittedRows {
             fit,
             rows: self,
             used,
-        })
+        };
+        if is_told || fitted.is_contradicted() {
+            Ok(fitted)
+        } else {
+            Err(not_identifiable())
+        }
     }
 
     fn solve(&self, used: &[bool]) -> Result<Corrected, Failure> {
@@ -213,6 +216,16 @@ impl FittedRows {
         let mean = torque.iter().sum::<f64>() / torque.len() as f64;
         torque.iter_mut().for_each(|v| *v -= mean);
         rms(&self.used(&self.fit.residuals)) / rms(&torque)
+    }
+
+    /// Whether the torque varies, by more than noise, which would vary as fast as the windows let through, and the
+    /// motion does not follow it.
+    fn is_contradicted(&self) -> bool {
+        let rows = &self.rows;
+        let [slope, torque] = [&rows.slope, &rows.right].map(|values| rms(&self.used(values)));
+        let left = rms(&self.used(&self.fit.residuals));
+        let of_noise = rows.window.noise(1, 1) / rows.window.noise(0, 0);
+        left > POOR * torque && slope.powi(2) < 0.25 * of_noise * left.powi(2)
     }
 
     /// The values of the used windows.
@@ -307,9 +320,6 @@ fn integral(samples: &[f64], rate_hz: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Residual relative to the variation of the torque above which the motion does not explain it.
-const UNEXPLAINED: f64 = 0.3;
-
 /// Half-length of the first window at which the result changes least: shorter ones are noisy, longer ones average over
 /// deviations from the equation. Always determined with one viscous friction.
 ///
@@ -338,7 +348,7 @@ pub(super) fn plateau(run: &FreeRun, directions: &Directions) -> usize {
             least = (left, half);
         }
         if let Ok(fitted) = fitted
-            && left < UNEXPLAINED
+            && left < POOR
         {
             let tried = Tried::of(fitted);
             halves.push(half);
