@@ -70,7 +70,8 @@ impl WindowRows {
             return Err(Failure::failed(
                 ErrorCode::TooFewSamples,
                 format_args!(
-                    "the body moves throughout only {} for windows of ±{half} samples; choose a shorter --window",
+                    "as far as the noise of the motion shows, the body moves throughout only {} for windows of \
+                     ±{half} samples; choose a shorter --window",
                     plural(places, "place")
                 ),
             ));
@@ -320,12 +321,11 @@ fn integral(samples: &[f64], rate_hz: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Half-length of the first window at which the result changes least: shorter ones are noisy, longer ones average over
-/// deviations from the equation. Always determined with one viscous friction.
+/// Half-length of the window to use. Always determined with one viscous friction.
 ///
-/// A window in which the motion does not explain the variation of the torque counts only if there is no other: noise,
-/// ripple or hum of the motion may outweigh its acceleration in short ones, and the constants are then near zero in all
-/// of them.
+/// Noise, ripple or hum of the motion may outweigh its acceleration in short windows, and the constants are then near
+/// zero in all of them. So if the motion does not explain the torque in the window found, one is taken in which it
+/// explains it at least twice as well, if there is any.
 pub(super) fn plateau(run: &FreeRun, directions: &Directions) -> usize {
     let moving = directions.moving(run.motion);
     let longest = moving.len() / (LEAST_WINDOWS / 2 + 2);
@@ -334,36 +334,45 @@ pub(super) fn plateau(run: &FreeRun, directions: &Directions) -> usize {
     while shortest > SHORTEST_HALF && WindowRows::of(run, directions, shortest, false).is_err() {
         shortest = SHORTEST_HALF.max(shortest * 2 / 3);
     }
+    let found = |most: f64| steadiest(run, directions, [shortest, longest], most);
+    match found(f64::INFINITY) {
+        Some((half, left)) if left > POOR => {
+            found(POOR.min(0.5 * left)).map_or(half, |(half, _)| half)
+        }
+        Some((half, _)) => half,
+        None => shortest,
+    }
+}
+
+/// Half-length, in a range, of the first window at which the result changes least, of those that leave at most that
+/// much unexplained, and what it leaves: shorter ones are noisy, longer ones average over deviations from the equation.
+fn steadiest(
+    run: &FreeRun,
+    directions: &Directions,
+    [shortest, longest]: [usize; 2],
+    most: f64,
+) -> Option<(usize, f64)> {
     let mut halves = Vec::new();
     let mut changes: Vec<f64> = Vec::new();
     let mut last: Option<Tried> = None;
-    let mut least = (f64::INFINITY, shortest);
     let mut half = shortest;
     while half <= longest {
         let fitted = WindowRows::of(run, directions, half, false).and_then(WindowRows::fit);
-        let left = fitted
-            .as_ref()
-            .map_or(f64::INFINITY, FittedRows::unexplained);
-        if left < least.0 {
-            least = (left, half);
-        }
-        if let Ok(fitted) = fitted
-            && left < POOR
-        {
+        let fitted = fitted.ok().map(|fitted| (fitted.unexplained(), fitted));
+        if let Some((left, fitted)) = fitted.filter(|(left, _)| *left <= most) {
             let tried = Tried::of(fitted);
-            halves.push(half);
+            halves.push((half, left));
             changes.extend(last.map(|last| last.change_to(&tried)));
             last = Some(tried);
             if let [.., before, change] = changes[..]
                 && before < change
             {
-                return halves[changes.len() - 2];
+                return Some(halves[changes.len() - 2]);
             }
         }
         half = half * 3 / 2;
     }
-    let best = changes.len().saturating_sub(1);
-    halves.get(best).copied().unwrap_or(least.1)
+    halves.get(changes.len().saturating_sub(1)).copied()
 }
 
 /// The part of a fit needed for comparison with the next one.
