@@ -16,8 +16,8 @@ use crate::identify::{Identification, NamedEstimate};
 const BEGINS: f64 = 0.5;
 /// Lag in periods of the strongest line from which the channels are aligned first.
 const PERIODS: f64 = 0.25;
-/// Residual of the aligned records over that of the records as they are, up to which the channels are late: more than
-/// one, as the lag may stand in for nothing else with as few modes.
+/// Residual of the aligned records over that of the records as they are, up to which the aligned ones are taken if they
+/// have no more modes.
 const AS_GOOD: f64 = 1.02;
 
 /// Samples by which the measured channel lags, negative if it leads; 0 for less than a fit of a delay finds.
@@ -91,7 +91,7 @@ pub(super) fn aligned<'a>(records: &[Driven<'a>], lag: isize) -> Vec<Driven<'a>>
     records.iter().map(moved).collect()
 }
 
-/// What explains the records better: as they are, or aligned. The lag is added to the delay of the aligned ones.
+/// What explains the records better: as they are, or aligned and with a delay, to which the lag is added.
 pub(super) fn better(
     as_recorded: Result<Identification, Failure>,
     aligned: Result<Identification, Failure>,
@@ -109,24 +109,13 @@ pub(super) fn better(
     if !is_better {
         return as_recorded;
     }
-    aligned
-        .warnings
-        .retain(|warning| warning.code != "channels-shifted");
-    let delay = aligned
-        .parameters
-        .iter_mut()
-        .find(|parameter| parameter.name == "delay");
-    let delay_s = match delay {
-        Some(delay) => {
-            *delay = NamedEstimate::new("delay", "s", delay.value() + lag_s, delay.std());
-            delay.value()
-        }
-        None => {
-            let delay = NamedEstimate::new("delay", "s", lag_s, None);
-            aligned.parameters.push(delay);
-            lag_s
-        }
-    };
+    let all = aligned.parameters.iter_mut();
+    let rest = all.filter(|parameter| parameter.name == "delay");
+    let mut delay_s = lag_s;
+    for delay in rest {
+        delay_s += delay.value();
+        *delay = NamedEstimate::new("delay", "s", delay_s, delay.std());
+    }
     shift::warn(&mut aligned, delay_s);
     Ok(aligned)
 }

@@ -105,7 +105,11 @@ pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identif
         return as_recorded;
     }
     let aligned = late::aligned(records, lag);
-    let found = cut(&aligned).and_then(|(result, of)| evaluate(&aligned, options, of, result));
+    let with_rest = ResponseOptions {
+        with_delay: true,
+        ..*options
+    };
+    let found = cut(&aligned).and_then(|(result, of)| evaluate(&aligned, &with_rest, of, result));
     late::better(as_recorded, found, lag as f64 / records[0].rate_hz)
 }
 

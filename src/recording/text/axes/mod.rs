@@ -195,10 +195,11 @@ impl Sources<'_> {
         let stamps = self.stamp_rule(group, header.as_ref().map(|(_, hz)| *hz))?;
         let stamps = stamps.or_else(|| self.rule_of_steps());
         let of_stamps = stamps.as_ref().and_then(|rule| rule.assumed.as_deref());
-        let vague = header
-            .as_ref()
-            .filter(|(words, _)| stamps.is_none() && keys::is_vague(words));
-        let of_header = vague.map(|(words, _)| {
+        let frequency = header.as_ref().filter(|(words, _)| {
+            let is_rate = keys::topic(words) == Some(keys::Topic::Rate);
+            stamps.is_none() && is_rate && keys::is_vague(words)
+        });
+        let of_header = frequency.map(|(words, _)| {
             format!("\"{words}\" above the table was taken for the sampling rate, but may be about the signal")
         });
         // A textual date and time is better than a tick count.
