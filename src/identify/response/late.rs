@@ -47,29 +47,22 @@ pub(super) fn lag(set: &Set, lines: &Lines) -> isize {
         .zip(&turned)
         .map(|(a, b)| a.hypot(*b))
         .collect();
-    let largest = |values: &mut dyn Iterator<Item = (usize, f64)>| {
-        values
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .unwrap_or_default()
-    };
-    let (peak, height) = largest(&mut envelope.iter().copied().enumerate());
-    let is_before = |back: &usize| envelope[(peak + count - back) % count] < BEGINS * height;
+    let largest = |a: &usize, b: &usize| envelope[*a].total_cmp(&envelope[*b]);
+    let peak = (0..count).max_by(largest).unwrap_or(0);
+    let least = BEGINS * envelope[peak];
+    let is_before = |back: &usize| envelope[(peak + count - back) % count] < least;
     let back = (0..count).find(is_before).unwrap_or(0);
     let begins = peak as isize - back as isize;
     let lag = match begins > (count / 2) as isize {
         true => begins - count as isize,
         false => begins,
     };
-    let (strongest, _) = largest(
-        &mut lines
-            .clone()
-            .map(|k| (k, weight(k) * frf.response[k].norm())),
-    );
-    let period = count as f64 / strongest as f64;
-    if (lag.unsigned_abs() as f64) < PERIODS * period {
-        0
-    } else {
-        lag
+    let size = |k: &usize| weight(*k) * frf.response[*k].norm();
+    let strongest = lines.clone().max_by(|a, b| size(a).total_cmp(&size(b)));
+    let period = count as f64 / strongest.unwrap_or(lines.start) as f64;
+    match (lag.unsigned_abs() as f64) < PERIODS * period {
+        true => 0,
+        false => lag,
     }
 }
 

@@ -330,6 +330,8 @@ pub(super) fn plateau(run: &FreeRun, directions: &Directions) -> usize {
     let moving = directions.moving(run.motion);
     let longest = moving.len() / (LEAST_WINDOWS / 2 + 2);
     let mut shortest = shortest_half(&moving, run.effort).min(longest.max(SHORTEST_HALF));
+    // As large as a channel.
+    drop(moving);
     // Between rests, there may be no room for it.
     while shortest > SHORTEST_HALF && WindowRows::of(run, directions, shortest, false).is_err() {
         shortest = SHORTEST_HALF.max(shortest * 2 / 3);

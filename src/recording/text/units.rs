@@ -129,7 +129,7 @@ pub fn heading(text: &str) -> Heading {
     if let Some((name, unit)) = ratio(text) {
         return Heading::new(name.to_owned(), Some(unit), None);
     }
-    for mark in [" in ", " en ", " em ", " / ", "/", ", ", ";"] {
+    for mark in BEFORE_UNITS.into_iter().chain([" / ", "/", ", ", ";"]) {
         if let Some((name, unit)) = text.rsplit_once(mark)
             && read(text).is_none()
             && !name.trim().is_empty()
@@ -145,6 +145,9 @@ pub fn heading(text: &str) -> Heading {
     Heading::new(text.to_owned(), time_word(text), None)
 }
 
+/// Words between a name and its unit.
+const BEFORE_UNITS: [&str; 3] = [" in ", " en ", " em "];
+
 /// Name and unit of a heading that ends in a ratio of voltages or lengths, whose slash does not separate a name
 /// from a unit: `bridge mV/V`, `eps_µm/m`.
 fn ratio(text: &str) -> Option<(&str, NamedUnit)> {
@@ -156,8 +159,8 @@ fn ratio(text: &str) -> Option<(&str, NamedUnit)> {
         Some(RatioOf::Voltages | RatioOf::Lengths)
     );
     let name = text[..start].trim_end_matches([' ', '_', ',', ';', ':']);
-    let name = [" in", " en", " em"]
-        .iter()
+    let mut words = BEFORE_UNITS.iter().map(|word| word.trim_end());
+    let name = words
         .find_map(|word| name.strip_suffix(word))
         .unwrap_or(name);
     (is_ratio && !name.is_empty()).then(|| (name.trim(), unit))
@@ -258,10 +261,8 @@ pub fn scaled_time(heading: &str) -> Option<f64> {
         words.find(|word| word.starts_with(['x', '×']) && word.len() > 1)
     };
     let named = || {
-        let mut marks = [" in ", " en ", " em ", "/"].into_iter();
-        marks
-            .find_map(|mark| heading.split_once(mark))
-            .map(|(_, unit)| unit)
+        let mut marks = BEFORE_UNITS.into_iter().chain(["/"]);
+        marks.find_map(|mark| Some(heading.split_once(mark)?.1))
     };
     let unit_of = |text: &str| read(text).filter(is_time).map(|unit| unit.unit.factor());
     if let Some((factor, unit)) = inside.or_else(word).or_else(named).and_then(factor) {
