@@ -155,15 +155,26 @@ fn a_factor_beside_the_time_that_could_be_either_is_asked_for() {
     compensate(&folder, &[]).says(0, &["2000 samples at 2000 Hz"]);
 }
 
-/// It may be the frequency of the signal.
+/// It may be the frequency of the signal; of two rates, either may be that of the samples; an interval of 5 may be one
+/// of 5 ms.
 #[test]
-fn a_mere_frequency_above_a_table_is_an_assumption() {
+fn a_doubtful_rate_above_a_table_is_an_assumption() {
     let folder = Folder::new();
     let rows: String = (0..2000).map(|i| format!("{:.9}\n", volts(i))).collect();
-    for (key, is_assumed) in [("Frequency", true), ("Sampling frequency", false)] {
-        folder.write("in.csv", format!("{key}: 2000 Hz\nbridge [V]\n{rows}"));
+    for (header, is_assumed) in [
+        ("Frequency: 2000 Hz", true),
+        ("Sampling frequency: 2000 Hz", false),
+        ("SampleRate: 2000\nSampleRate: 1000", true),
+        ("Sample rate: 2000 Hz\nSample interval: 1 ms", true),
+        ("Sample rate: 2000 Hz\nSample interval: 0.5 ms", false),
+        ("Sample rate: 2000 Hz\nMax. sample rate: 100 kHz", false),
+        ("Interval: 5", true),
+        ("Interval: 5 ms", false),
+        ("Interval: 0.0005", false),
+    ] {
+        folder.write("in.csv", format!("{header}\nbridge [V]\n{rows}"));
         let report = folder.json(&["inspect", "in.csv", "--json"]);
         let is_said = crate::util::codes(&report).contains(&"time-assumed");
-        assert_eq!(is_said, is_assumed, "{report}");
+        assert_eq!(is_said, is_assumed, "{header}: {report}");
     }
 }

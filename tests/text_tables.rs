@@ -319,6 +319,44 @@ fn commas_and_points_that_both_read_both_ways_are_asked_for() {
     assert_eq!([smallest(0), smallest(1)], [Some(4.026), Some(1500.5)]);
 }
 
+/// Stamps with a decimal comma beside values with a decimal point had been a thousand times too large.
+#[test]
+fn other_marks_in_some_columns_are_asked_about() {
+    let folder = Folder::new();
+    let rows = |value: fn(i32) -> String| -> String {
+        let row = |i: i32| format!("0,{i:03};{}\n", value(i));
+        (0..400).map(row).collect()
+    };
+    let cases: [(fn(i32) -> String, Option<f64>); 4] = [
+        (|i| format!("{}.{:03}", 7 + i % 6, 271 + i), None),
+        // Nine hundred is too small for a separator, and millions have two.
+        (
+            |i| {
+                if i == 0 {
+                    "900".to_owned()
+                } else {
+                    format!("1.{:03}", 271 + i)
+                }
+            },
+            Some(1670.0),
+        ),
+        (|i| format!("1.{:03}.250", 271 + i), Some(1_670_250.0)),
+        (|i| format!("7.{:03},5", 271 + i), Some(7670.5)),
+    ];
+    for (value, largest) in cases {
+        folder.write("in.csv", format!("Zeit [s];M [N m]\n{}", rows(value)));
+        let Some(largest) = largest else {
+            let says = ["line 2", "7.271", "--decimal ,", "same decimal mark"];
+            folder.run(&["inspect", "in.csv"]).says(1, &says);
+            let decided = folder.json(&["inspect", "in.csv", "--json", "--decimal", ","]);
+            assert_eq!(decided["channels"][0]["largest"], 12_666.0);
+            continue;
+        };
+        let report = folder.json(&["inspect", "in.csv", "--json"]);
+        assert_eq!(report["channels"][0]["largest"], largest);
+    }
+}
+
 #[test]
 fn a_comma_that_could_be_either_is_asked_for() {
     let folder = Folder::new();

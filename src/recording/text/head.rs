@@ -159,6 +159,9 @@ fn find_in(head: &Head, marks: &DialectOverride) -> Result<Table, Failure> {
         if marks.delimiter.is_none() {
             commas::refuse(head, &table)?;
         }
+        if marks.decimal.is_none() {
+            thousands::refuse_mixed(head, &table)?;
+        }
         return Ok(below_numbering(head, table));
     }
     let lenient = tables(head, &all, lenient_row);

@@ -43,21 +43,54 @@ pub(super) fn refuse(head: &Head, table: &Table, others: &[&Table]) -> Result<()
     .line(head.number(place)))
 }
 
+/// Rejects a table with a column in which every number has the mark that is not the decimal mark of the others, before
+/// three digits: `10.271` beside `0,001`.
+///
+/// # Errors
+/// If the table is such a one.
+pub(super) fn refuse_mixed(head: &Head, table: &Table) -> Result<(), Failure> {
+    let decimal = table.dialect.decimal;
+    let columns = marked_columns(head, table, decimal).into_iter();
+    let mut mixed = columns.filter(|c| !c.has_plain && !c.has_others);
+    let Some(place) = mixed.find_map(|column| column.grouped) else {
+        return Ok(());
+    };
+    let (mark, decimal) = match decimal {
+        b',' => ("point", "comma"),
+        _ => ("comma", "point"),
+    };
+    let shown: String = head.lines[place].text.trim().chars().take(60).collect();
+    Err(Failure::failed(
+        ErrorCode::TextUnclear,
+        format_args!(
+            "the {mark} in \"{shown}\" stands before three digits in every row of its column, while others have a decimal \
+             {decimal}: it can be a decimal mark or stand between thousands. If it stands between thousands, say so with \
+             --decimal {}; otherwise write the same decimal mark in all columns",
+            char::from(table.dialect.decimal)
+        ),
+    )
+    .line(head.number(place)))
+}
+
 /// Location of the first number of a column whose points look like thousands separators: each is followed by three
 /// digits and not preceded by a zero, and the numbers without one are integers of at most three digits. Numbers with
 /// a fixed number of decimals have a point in all of them, and those with as many as needed have other counts.
 fn grouped_place(head: &Head, table: &Table, other: Dialect) -> Option<usize> {
+    let mut columns = marked_columns(head, table, other.decimal).into_iter();
+    columns.find_map(|c| c.grouped.filter(|_| c.has_plain && !c.has_others))
+}
+
+fn marked_columns(head: &Head, table: &Table, decimal: u8) -> Vec<MarkedColumn> {
     let mut columns = vec![MarkedColumn::default(); table.width];
     for (place, line) in head.lines.iter().enumerate().skip(table.first) {
         if is_skipped(&line.text) {
             continue;
         }
         for (column, text) in columns.iter_mut().zip(table.dialect.cells(&line.text)) {
-            column.add(place, &text, other.decimal);
+            column.add(place, &text, decimal);
         }
     }
-    let mut columns = columns.into_iter();
-    columns.find_map(|c| c.grouped.filter(|_| c.has_plain && !c.has_others))
+    columns
 }
 
 /// Location of the first number with commas as thousands separators.
@@ -74,7 +107,7 @@ fn comma_place(head: &Head, table: &Table) -> Option<usize> {
 /// Format of the numbers of a column.
 #[derive(Default, Clone)]
 struct MarkedColumn {
-    /// The line of the first one with thousands separators.
+    /// The line of the first one with a mark before three digits.
     grouped: Option<usize>,
     /// Whether some are integers too small for a separator.
     has_plain: bool,
@@ -86,9 +119,11 @@ impl MarkedColumn {
     fn add(&mut self, place: usize, text: &str, decimal: u8) {
         let digits = text.trim_start_matches(['+', '-']);
         let is_plain = digits.len() <= GROUP && digits.bytes().all(|b| b.is_ascii_digit());
+        let other = if decimal == b',' { '.' } else { ',' };
+        let has_one_mark = || text.contains(other) && text.matches(['.', ',']).count() == 1;
         match Cell::read(text, decimal) {
             Cell::Empty | Cell::NonFinite => {}
-            Cell::Grouped(_) => self.grouped = self.grouped.or(Some(place)),
+            Cell::Grouped(_) if has_one_mark() => self.grouped = self.grouped.or(Some(place)),
             Cell::Number(_) if is_plain => self.has_plain = true,
             _ => self.has_others = true,
         }

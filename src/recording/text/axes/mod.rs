@@ -1,6 +1,7 @@
 //! Detection of time columns, and the axis of every other column.
 
 mod groups;
+mod header_rate;
 mod left_out;
 mod places;
 mod stamps;
@@ -20,7 +21,7 @@ use crate::warning::Warning;
 use groups::{Group, groups};
 pub use stamps::StampRule;
 
-/// Largest relative difference of a header rate from that of the stamps for both to mean the same.
+/// Largest relative difference of a header rate from that of the stamps, or from another one, for both to mean the same.
 const SAME: f64 = 0.02;
 /// Relative difference of the two explained by rounding of the stamps.
 const ROUNDED: f64 = 1e-6;
@@ -195,13 +196,8 @@ impl Sources<'_> {
         let stamps = self.stamp_rule(group, header.as_ref().map(|(_, hz)| *hz))?;
         let stamps = stamps.or_else(|| self.rule_of_steps());
         let of_stamps = stamps.as_ref().and_then(|rule| rule.assumed.as_deref());
-        let frequency = header.as_ref().filter(|(words, _)| {
-            let is_rate = keys::topic(words) == Some(keys::Topic::Rate);
-            stamps.is_none() && is_rate && keys::is_vague(words)
-        });
-        let of_header = frequency.map(|(words, _)| {
-            format!("\"{words}\" above the table was taken for the sampling rate, but may be about the signal")
-        });
+        let alone = header.as_ref().filter(|_| stamps.is_none());
+        let of_header = alone.and_then(|(words, hz)| self.doubt_of_header(words, *hz));
         // A textual date and time is better than a tick count.
         let is_count = |text: &String| text.bytes().all(|byte| byte.is_ascii_digit());
         let mut start_text = stamps.as_ref().and_then(|rule| rule.start_text.clone());
@@ -227,24 +223,6 @@ impl Sources<'_> {
             rule.header = self.header_rate(Some(place)).or(rule.header);
         }
         rule
-    }
-
-    /// Header rate for a column (or for all), and the words that give it.
-    fn header_rate(&self, place: Option<usize>) -> Option<(String, f64)> {
-        // The frequency of a signal may precede the rate.
-        let is_vague = |entry: &&Entry| keys::is_vague(&entry.key);
-        let clear = self.entries.iter().filter(|entry| !is_vague(entry));
-        clear
-            .chain(self.entries.iter().filter(is_vague))
-            .find_map(|entry| {
-                let filled = entry.values.iter().filter(|v| !v.is_empty()).count();
-                let own = place
-                    .and_then(|place| place.checked_sub(1))
-                    .filter(|_| filled > 1)
-                    .and_then(|value| keys::rate_hz(entry, Some(value), self.decimal));
-                let hz = own.or_else(|| keys::rate_hz(entry, None, self.decimal))?;
-                Some((entry.key.clone(), hz))
-            })
     }
 
     fn header_start(&self) -> Option<f64> {

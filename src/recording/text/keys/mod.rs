@@ -4,7 +4,7 @@ mod values;
 mod words;
 
 use crate::recording::text::dialect::{Delimiter, Dialect};
-pub use values::{date_text, quantity, rate_hz, seconds};
+pub use values::{date_text, has_unit, quantity, rate_hz, seconds};
 pub use words::{is_vague, topic};
 
 /// A line with a key and values.

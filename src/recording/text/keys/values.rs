@@ -88,6 +88,18 @@ pub fn rate_hz(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> 
     Some(crate::recording::without_rounding(hz)).filter(|hz| hz.is_finite())
 }
 
+/// Whether a unit is given with the first value of an entry.
+#[must_use]
+pub fn has_unit(entry: &Entry, decimal: u8) -> bool {
+    let mut values = entry.values.iter().filter(|value| !value.is_empty());
+    let own = values.next().and_then(|value| quantity(value, decimal));
+    own.is_some_and(|(_, unit)| !unit.is_empty())
+        || in_brackets(&entry.key).is_some_and(|unit| !unit.is_empty())
+        || values
+            .next()
+            .is_some_and(|text| quantity(text, decimal).is_none())
+}
+
 /// The first of values given per channel, `CH1:1.0E-06 CH2:1.0E-06`, or the value as it is.
 fn of_first_channel(value: &str) -> &str {
     let first = value.split_whitespace().next().unwrap_or_default();
