@@ -574,3 +574,50 @@ fn hysteresis_of_a_ramp_does_not_bias_the_sensitivity() {
         }
     }
 }
+
+/// Seven loads of a hundred rows each, applied over three rows, with a reference cell whose noise is 0.07 to 5 % of the
+/// largest. With the rows taken singly, the sensitivity had been half of what it is.
+#[test]
+fn noise_of_a_measured_load_does_not_bias_the_sensitivity() {
+    let units = units();
+    let mut noise = Noise(54);
+    let steps = [0.0, 10.0, 20.0, 30.0, 20.0, 10.0, 0.0];
+    for cell in [0.02, 0.1, 1.0, 1.5] {
+        let mut coverage = Coverage::default();
+        for table in 0..100 {
+            // In every second table the reading settles within five rows.
+            let time_constant = if table % 2 == 0 { 0.1 } else { 5.0 };
+            let (mut points, mut load, mut reading) = (Vec::new(), 0.0, 0.0);
+            for step in steps {
+                let change = step - load;
+                for row in 0..103 {
+                    load = step - change * (0.75 - 0.25 * f64::from(row)).max(0.0);
+                    reading += (0.1 * load - reading) * (1.0 - f64::exp(-1.0 / time_constant));
+                    let measured = load + cell * noise.normal();
+                    points.push(point(measured, 0.02 + reading + 1e-3 * noise.normal(), 0));
+                }
+            }
+            let loads: Vec<f64> = points.iter().map(|p| p.load).collect();
+            for (point, series) in points.iter_mut().zip(series_of(&loads)) {
+                point.series = series;
+            }
+            let found = identify(&points, 1, &units).unwrap();
+            assert!(
+                !found
+                    .warnings
+                    .iter()
+                    .any(|w| w.code == "not-linear" || w.code == "poor-fit"),
+                "{cell}: {:?}",
+                found.warnings
+            );
+            coverage.count(of(&found, "sensitivity"), 0.1);
+        }
+        println!("{cell}: {} of {}", coverage.inside, coverage.all);
+        assert!(
+            coverage.inside >= 92,
+            "{cell}: {} of {}",
+            coverage.inside,
+            coverage.all
+        );
+    }
+}

@@ -114,7 +114,8 @@ pub(super) fn warn(
     let readings: Vec<f64> = points.iter().map(|p| p.reading).collect();
     // Rounding of equal readings is no scatter.
     let rounding = resolution(&readings).unwrap_or(0.0) / 12.0_f64.sqrt();
-    let expected = (scatter / each).max(rounding);
+    let of_load = curve[1].abs() * steps.load_std;
+    let expected = (scatter / each).max(rounding).max(of_load);
     if off <= OFF.0 * expected || off <= OFF.1 * deflection {
         return;
     }

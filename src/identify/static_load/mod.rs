@@ -4,6 +4,7 @@ mod filter;
 mod groups;
 mod linear;
 mod mixed;
+mod plateaus;
 mod ramp;
 mod rows;
 mod settling;
@@ -21,6 +22,7 @@ use crate::chart::{Chart, Series};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::{self, plural, rounded};
 use mixed::LoadCurve;
+use plateaus::{PlateauLoads, PlateauReadings};
 use ramp::RampReadings;
 use steps::LoadSteps;
 
@@ -78,6 +80,8 @@ const NONE: f64 = 1e-3;
 /// Series number of each point, for tables without them: a series ends with the return to no load.
 #[must_use]
 pub fn series_of(loads: &[f64]) -> Vec<usize> {
+    let plateaus = PlateauLoads::of(loads);
+    let loads = plateaus.as_ref().map_or(loads, |p| &p.loads);
     let largest = loads.iter().fold(0.0_f64, |m, l| m.max(l.abs()));
     let zero = |l: f64| l.abs() <= NONE * largest;
     let mut series = 0;
@@ -94,6 +98,13 @@ pub fn series_of(loads: &[f64]) -> Vec<usize> {
         numbers.push(series);
     }
     numbers
+}
+
+/// Standard uncertainty of the mean of readings, if theirs are known.
+fn std_of_mean(points: &[Point]) -> Option<f64> {
+    let variances = points.iter().map(|p| p.std.map(|std| std * std));
+    let sum: Option<f64> = variances.sum();
+    sum.map(|sum| sum.sqrt() / points.len() as f64)
 }
 
 /// Minimum number of rows for a single load and no load.
@@ -140,14 +151,18 @@ pub fn identify(
     degree: usize,
     units: &LoadUnits,
 ) -> Result<Identification, Failure> {
+    let plateaus = PlateauReadings::of(points);
+    let points = plateaus.as_ref().map_or(points, |p| &p.rows);
     let steps = LoadSteps::of(points);
     let is_one_weight = one_weight(points, degree, &steps)?;
     let settled = settling::settled(points);
-    let points = settled.as_ref().map_or(points, |s| &s.points);
+    let means = plateaus.as_ref().map_or(points, |p| &p.means);
+    let points = settled.as_ref().map_or(means, |s| &s.points);
     let ramp = ramp::ranges(points);
     let points = ramp.as_ref().map_or(points, |r| &r.points);
     let steps = LoadSteps {
         is_ramp: ramp.is_some(),
+        load_std: plateaus.as_ref().map_or(0.0, PlateauReadings::load_std),
         ..LoadSteps::of(points)
     };
     let largest = steps.largest;
@@ -176,6 +191,8 @@ pub fn identify(
     contradicted(&mut result, &fit);
     zero::drifting(&mut result, &fit, points, (largest, &units.reading));
     result.fit = Some(quality);
+    let of_plateaus = plateaus.as_ref().map(|p| p.method(&units.load));
+    result.method.extend(of_plateaus);
     result
         .method
         .extend(ramp.as_ref().map(RampReadings::method));

@@ -8,7 +8,7 @@
 use super::mixed::MOST_LOOPS;
 use super::solve::Mixed;
 use super::steps::LoadSteps;
-use super::{Point, value_of};
+use super::{Point, std_of_mean, value_of};
 use crate::print::plural;
 use crate::student::student;
 
@@ -71,10 +71,6 @@ pub(super) fn ranges(points: &[Point]) -> Option<RampReadings> {
 fn reading(points: &[Point], load: f64, all: &[f64; 2]) -> Point {
     let count = points.len() as f64;
     let mean = |of: &dyn Fn(&Point) -> f64| points.iter().map(of).sum::<f64>() / count;
-    let std = points[0].std.map(|_| {
-        let variance = mean(&|p| p.std.map_or(0.0, |std| std * std));
-        (variance / count).sqrt()
-    });
     let own = line(points);
     let line = match points.len() >= OWN_SLOPE && own[1].is_finite() {
         true => own,
@@ -83,7 +79,7 @@ fn reading(points: &[Point], load: f64, all: &[f64; 2]) -> Point {
     Point {
         load,
         reading: mean(&|p| p.reading - value_of(&line, p.load)) + value_of(&line, load),
-        std,
+        std: std_of_mean(points),
         ..points[0]
     }
 }

@@ -18,7 +18,7 @@ use crate::print::{plural, relative, rounded};
 use torqcomp_dsp::quality::median;
 
 /// Minimum number of rows at a load for its settling to be fitted, and minimum fraction of rows at such loads.
-const RUN: usize = 4;
+pub(super) const RUN: usize = 4;
 const STEPWISE: f64 = 0.8;
 /// Minimum number of changes of the load, and their minimum size relative to the largest load: a slow ramp has smaller
 /// ones.
@@ -61,6 +61,11 @@ fn runs(points: &[Point], largest: f64) -> Vec<&[Point]> {
     runs
 }
 
+/// Whether most rows are at loads that change in clear steps.
+pub(super) fn is_stepwise(rows_at_loads: usize, rows: usize, change: f64, largest: f64) -> bool {
+    rows_at_loads as f64 > STEPWISE * rows as f64 && change > STEP * largest
+}
+
 /// Settled readings, one for each time that a load was applied.
 pub(super) struct SettledReadings {
     pub points: Vec<Point>,
@@ -88,9 +93,8 @@ pub(super) fn settled(points: &[Point]) -> Option<SettledReadings> {
         .windows(2)
         .map(|pair| (pair[1][0].load - pair[0][0].load).abs())
         .collect();
-    let is_stepwise = rows as f64 > STEPWISE * points.len() as f64
-        && median(&mut changes).is_some_and(|change| change > STEP * largest);
-    if runs.len() <= CHANGES || !is_stepwise {
+    let change = median(&mut changes)?;
+    if runs.len() <= CHANGES || !is_stepwise(rows, points.len(), change, largest) {
         return None;
     }
     let first = Settling::fit(&runs, LEFT_OUT[0])?;

@@ -17,6 +17,8 @@ pub(super) struct LoadSteps {
     pub is_sorted: bool,
     /// Whether they are ranges of a steadily changing load.
     pub is_ramp: bool,
+    /// Standard uncertainty of a load; 0 for known loads.
+    pub load_std: f64,
 }
 
 impl LoadSteps {
@@ -33,6 +35,7 @@ impl LoadSteps {
             largest,
             is_sorted: rows::is_sorted(points),
             is_ramp: false,
+            load_std: 0.0,
         }
     }
 
