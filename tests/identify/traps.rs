@@ -834,3 +834,45 @@ fn a_quiet_tail_makes_no_poor_fit() {
         assert!(!codes(&report).contains(&"poor-fit"), "{report}");
     }
 }
+
+/// A sweep through the resonance, limited by an amplifier with noise after it: the damping ratio had been 24 % too
+/// large, and the torque was said to be noisy.
+#[test]
+fn a_sweep_limited_before_the_noise_is_clipped() {
+    let sweep = |t: f64| (TAU * (5.0 * t + 12.5 * t * t)).sin();
+    let (torque, shown) = super::response::driven_by(sweep, 8000);
+    let peak = shown.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    for (part, size) in [
+        (2.0, 0.0),
+        (0.85, 1e-4),
+        (0.5, 1e-4),
+        (0.5, 1e-3),
+        (0.3, 1e-3),
+    ] {
+        let mut noise = Noise(17);
+        let limited = shown
+            .iter()
+            .map(|x| x.clamp(-part * peak, part * peak) + size * peak * noise.normal());
+        let rows = torque.iter().zip(limited).enumerate();
+        let row =
+            |(i, (m, x)): (usize, (&f64, f64))| format!("{:.3},{m:.6},{x:.7}\n", 1e-3 * i as f64);
+        let folder = Folder::new();
+        let rows: String = rows.map(row).collect();
+        folder.write(
+            "sweep.csv",
+            format!("time [s],torque [N m],bridge [V]\n{rows}"),
+        );
+        let args = "identify response sweep.csv --applied torque --measured bridge --json";
+        let report = folder.json(&args.split(' ').collect::<Vec<_>>());
+        let all = codes(&report);
+        assert_eq!(
+            all.contains(&"clipped"),
+            part < 1.0,
+            "{part}, {size}: {all:?}"
+        );
+        assert!(
+            !all.contains(&"noise-before-resonance"),
+            "{part}, {size}: {all:?}"
+        );
+    }
+}

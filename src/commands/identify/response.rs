@@ -58,6 +58,10 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
     let unit = loaded[0].channels[1].unit.as_ref();
     let motion = motion_of(args, &loaded[0].channels[1].name, unit)?;
     let mut result = identify(&records, &options(args, motion))?;
+    // A clipped resonance looks like noise before it.
+    let is_clipped = recorded.warnings.iter().any(|w| w.code == "clipped");
+    let warnings = &mut result.warnings;
+    warnings.retain(|w| !is_clipped || w.code != "noise-before-resonance");
     if let (Some(fit), Some(unit)) = (&mut result.fit, unit) {
         fit.unit.clone_from(&unit.text);
     }

@@ -10,23 +10,27 @@ const PARTS: [f64; 2] = [256.0, 64.0];
 /// sine.
 const PILE: usize = 4;
 /// Minimum fraction of all samples in a pile-up.
-const LEAST: f64 = 0.01;
+const LEAST: f64 = 1e-3;
 /// Fraction of all samples at both ends above which a signal rests or switches there.
 const RESTING: f64 = 0.6;
 /// Minimum number of clipped peaks in the outermost part: one or two can be steps of the signal.
 const FEWEST: usize = 3;
 /// Minimum fraction of these runs that must be clipped.
 const CUT: f64 = 1.0 / 3.0;
+/// Part of the range beside the extreme with whose runs those at it are compared: those of small or slow parts of a
+/// record, farther away, are longer.
+const NEAR: f64 = 0.25;
 /// Minimum number of samples of a clipped peak.
 const SHORTEST: usize = 3;
 
 /// Detects clipping of a signal at a level before a little noise was added to it.
 ///
 /// The range is divided into 256 parts (64, if the noise is larger). Its outermost part contains a clipping level if
-/// 1. it has more than 4 times the samples of the adjacent part, and 1 % of all: of a sine of amplitude `A`, a fraction
+/// 1. it has more than 4 times the samples of the adjacent part, and 0.1 % of all: of a sine of amplitude `A`, a fraction
 ///    `arccos(1 − w/A)/π` lies within `w` of the peak, 2.4 times as many as in the next `w`;
-/// 2. at least 3 runs of samples in it are longer than twice the 95th percentile of the runs in other parts, and none
-///    of those is as long as the longest: a signal that rests at several levels is not clipped at the last of them;
+/// 2. at least 3 runs of samples in it are longer than twice the 95th percentile of the runs in the other parts of the
+///    outermost quarter of the range, and none of those is as long as the longest: a signal that rests at several levels
+///    is not clipped at the last of them;
 /// 3. one in three of these runs is both entered and left in full motion, by the criterion of
 ///    [`clipping`](fn@super::clipping::clipping) with a tolerance of 4 parts.
 ///
@@ -72,7 +76,7 @@ fn rail(samples: &[f64], [far, extreme]: [f64; 2], width: f64) -> Option<Rail> {
     if pile <= PILE * next || part_of(pile) < LEAST || part_of(pile + resting) > RESTING {
         return None;
     }
-    let is_elsewhere = |run: &Run| run.value != 0.0 && run.value != -last;
+    let is_elsewhere = |run: &Run| run.value < 0.0 && run.value > -NEAR * last;
     let usual = Lengths::of(runs(&levels).filter(is_elsewhere)).quantile(0.95)?;
     let shortest = SHORTEST.max(2 * usual + 1);
     let at: Vec<Run> = runs(&levels)
