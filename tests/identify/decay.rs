@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use torqcomp::identify::{Identification, decay};
 
-use super::{Coverage, Noise, TAU, of, times};
+use super::{Coverage, Noise, TAU, of, of_decay, times};
 use crate::util::assert_close;
 
 fn ring(times_s: &[f64], values: &[f64], rate_hz: f64) -> (Identification, Vec<decay::Stretch>) {
@@ -286,4 +286,75 @@ fn the_law_of_damping_is_told() {
             .any(|w| w.code == "amplitude-dependent" || w.code == "not-viscous"),
         "{both:?}"
     );
+}
+
+/// Two modes 2 to 3 % apart beat. They had been one mode, with two and a half times the damping.
+#[test]
+fn two_modes_that_beat_are_two() {
+    let mut coverage = Coverage::default();
+    for seed in 0..20 {
+        let mut noise = Noise(70 + seed);
+        let [phase, other] = [0; 2].map(|_| TAU * noise.uniform());
+        let (ratio, apart) = [(0.01, 1.03), (0.004, 1.02)][seed as usize % 2];
+        let sine = |t: f64, hz: f64, phase: f64| {
+            let omega = TAU * hz;
+            (-ratio * omega * t).exp() * (omega * f64::sqrt(1.0 - ratio * ratio) * t + phase).cos()
+        };
+        let record: Vec<f64> = times(4000, 2000.0)
+            .iter()
+            .map(|t| {
+                sine(*t, 100.0, phase)
+                    + 0.8 * sine(*t, 100.0 * apart, other)
+                    + 1e-3 * noise.normal()
+            })
+            .collect();
+        let found = of_decay(&record, 2000.0);
+        assert_eq!(found.modes.len(), 2, "{seed}: {:?}", found.parameters);
+        assert!(
+            found.warnings.iter().all(|w| w.code == "not-anchored"),
+            "{:?}",
+            found.warnings
+        );
+        for k in ["mode_1", "mode_2"] {
+            coverage.count(of(&found, &format!("{k}_damping_ratio")), ratio);
+        }
+    }
+    println!("{} of {}", coverage.inside, coverage.all);
+    assert!(
+        coverage.inside >= 36,
+        "{} of {}",
+        coverage.inside,
+        coverage.all
+    );
+}
+
+/// A spring that stiffens is no pair of modes: its frequency changes with the amplitude.
+#[test]
+fn a_frequency_that_changes_is_no_second_mode() {
+    for (seed, cube) in (0..).zip([0.01, 0.03, 0.1, 0.3, 1.0]) {
+        let mut noise = Noise(90 + seed);
+        let omega = TAU * 100.0;
+        let slope = |x: f64, v: f64| -omega * omega * (x + cube * x.powi(3)) - 0.02 * omega * v;
+        let (mut x, mut v, h) = (1.0, 0.0, 1.0 / 2000.0 / 40.0);
+        let mut record = Vec::new();
+        for i in 0..4000 * 40 {
+            if i % 40 == 0 {
+                record.push(x + 1e-3 * noise.normal());
+            }
+            let middle = (x + 0.5 * h * v, v + 0.5 * h * slope(x, v));
+            (x, v) = (x + h * middle.1, v + h * slope(middle.0, middle.1));
+        }
+        let found = of_decay(&record, 2000.0);
+        let hz = found
+            .parameters
+            .iter()
+            .filter(|p| p.name.ends_with("damped_frequency"));
+        let hz: Vec<f64> = hz.map(|p| p.value()).collect();
+        let near = hz
+            .iter()
+            .filter(|hz| (**hz / 100.0 - 1.0).abs() < 0.5)
+            .count();
+        let is_said = found.warnings.iter().any(|w| w.code == "close-lines");
+        assert!(near == 1 || is_said, "{cube}: {hz:?}");
+    }
 }

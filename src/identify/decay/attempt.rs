@@ -4,8 +4,8 @@ use torqcomp_model::fit::FitError;
 
 use super::modes::{ModesFit, Stretch, fit};
 use super::search::{
-    LEAST_GAIN, ModeSearch, RESOLVED, close, gain, is_left_of, largest, next_pole, physical,
-    steady, take_off,
+    LEAST_GAIN, ModeSearch, RESOLVED, close, gain, is_close, is_left_of, largest, next_pole,
+    physical, steady, take_off,
 };
 use super::{baseline, first_period};
 use crate::identify::Pole;
@@ -15,6 +15,9 @@ use crate::identify::hum::SteadyLine;
 const MOST_LINES: usize = 8;
 /// Maximum number of periods removed from the start of a decay, once its modes are known.
 const MOST_PERIODS: usize = 4;
+
+/// Minimum amplitude of one of two modes close together, relative to that of the other.
+const COMPARABLE: f64 = 0.1;
 
 /// Current state of the search.
 pub(super) struct Attempt<'a> {
@@ -112,7 +115,7 @@ impl<'a> Attempt<'a> {
             return Ok(true);
         }
         let is_transient = |mode: &Pole| first_period::is_transient(next.poles[last], *mode);
-        let is_filter = self.is_clear(next, stretches)
+        let is_filter = is_clear(&self.fit, next, stretches)
             && self.fit.poles.first().is_some_and(is_transient)
             && first_period::cut_off(stretches, &self.fit, first_period::LARGER);
         if is_filter {
@@ -125,7 +128,7 @@ impl<'a> Attempt<'a> {
     /// whether one was.
     fn is_taken(&mut self, stretches: &mut [Stretch], next: ModesFit) -> Result<bool, FitError> {
         let last = self.fit.poles.len();
-        let is_clear = self.is_clear(&next, stretches);
+        let is_clear = is_clear(&self.fit, &next, stretches);
         // Next to a mode it is a residual of its damping law.
         let is_tone =
             is_clear && steady(&next, last, stretches).is_some() && close(&next.poles).is_none();
@@ -142,7 +145,9 @@ impl<'a> Attempt<'a> {
             return Ok(true);
         }
         if self.wanted.count.is_none() {
-            self.fit.close_hz = close(&next.poles).filter(|_| pays);
+            let close_hz = close(&next.poles).filter(|_| pays);
+            let is_pair = close_hz.is_some() && self.is_pair(&next, stretches)?;
+            self.fit.close_hz = close_hz.filter(|_| !is_pair);
             if !pays || self.fit.close_hz.is_some() {
                 return Ok(false);
             }
@@ -154,6 +159,30 @@ impl<'a> Attempt<'a> {
             self.refit(stretches)?;
         }
         Ok(true)
+    }
+
+    /// Whether a fit whose last mode is close to another describes two modes of the stand: resolved, of comparable size, and
+    /// without a further line beside them, as a frequency that changes with the amplitude would leave.
+    fn is_pair(&self, next: &ModesFit, stretches: &[Stretch]) -> Result<bool, FitError> {
+        let Some((last, others)) = next.poles.split_last() else {
+            return Ok(false);
+        };
+        let size = largest(next, others.len(), stretches);
+        let is_mode = |(k, other): (usize, &Pole)| {
+            let apart = (other.omega_rad_per_s - last.omega_rad_per_s).abs();
+            let is_resolved = apart > other.rate_per_s + last.rate_per_s;
+            is_resolved && size > COMPARABLE * largest(next, k, stretches)
+        };
+        let mut close_by = others.iter().enumerate().filter(|(_, o)| is_close(o, last));
+        if !close_by.all(is_mode) {
+            return Ok(false);
+        }
+        let Some(pole) = next_pole(stretches, next, self.wanted.band_hz) else {
+            return Ok(true);
+        };
+        let third = fit(stretches, &[&next.poles[..], &[pole]].concat())?;
+        let is_left = close(&third.poles).is_some() && is_clear(next, &third, stretches);
+        Ok(!is_left)
     }
 
     /// Removes a baseline if it moves and none was removed before; returns whether it did.
@@ -201,10 +230,10 @@ impl<'a> Attempt<'a> {
         };
         Ok(())
     }
+}
 
-    /// Whether one more mode clearly reduces the error.
-    fn is_clear(&self, next: &ModesFit, stretches: &[Stretch]) -> bool {
-        gain(&self.fit, next, stretches) > LEAST_GAIN
-            && next.fit.sum_of_squares < 0.98 * self.fit.fit.sum_of_squares
-    }
+/// Whether one more mode clearly reduces the error.
+fn is_clear(before: &ModesFit, after: &ModesFit, stretches: &[Stretch]) -> bool {
+    gain(before, after, stretches) > LEAST_GAIN
+        && after.fit.sum_of_squares < 0.98 * before.fit.sum_of_squares
 }

@@ -19,8 +19,8 @@ pub(super) struct ModeSearch {
     pub band_hz: (f64, f64),
 }
 
-/// Relative frequency difference below which two lines are one mode, unless the number of modes is given: a frequency
-/// or damping that changes with amplitude or time looks the same.
+/// Relative frequency difference below which two lines are one mode, unless the number of modes is given or they are
+/// clearly two: a frequency or damping that changes with amplitude or time looks similar.
 const CLOSE: f64 = 0.03;
 
 /// Power of the residual, relative to that of the decay, below which the search ends: 110 dB, beyond the
@@ -169,10 +169,13 @@ pub(super) fn gain(before: &ModesFit, after: &ModesFit, stretches: &[Stretch]) -
 
 /// Frequency in Hz of a mode that is too close to the last one, if any.
 pub(super) fn close(poles: &[Pole]) -> Option<f64> {
-    let last = poles.last()?;
-    let near = |p: &&Pole| (p.omega_rad_per_s / last.omega_rad_per_s - 1.0).abs() < CLOSE;
-    let found = poles[..poles.len() - 1].iter().find(near)?;
+    let (last, others) = poles.split_last()?;
+    let found = others.iter().find(|other| is_close(other, last))?;
     Some(found.frequency_hz())
+}
+
+pub(super) fn is_close(a: &Pole, b: &Pole) -> bool {
+    (a.omega_rad_per_s / b.omega_rad_per_s - 1.0).abs() < CLOSE
 }
 
 /// Standard uncertainties by which the decay rate of the first mode and of any other one must differ from zero. A stand
