@@ -16,7 +16,7 @@ use torqcomp_dsp::quality::mains::MainsLine;
 use crate::recording::{AlignedChannels, Channel, TimeAxis};
 use crate::warning::Warning;
 
-pub use samples::{Findings, clipped_ends};
+pub use samples::{Findings, clipped_ends, repeats_of};
 pub use time::TimeFindings;
 
 /// Warnings about samples to be used by a command, and about their time axis.
@@ -61,6 +61,13 @@ pub(crate) fn clipped(aligned: &AlignedChannels) -> Vec<Warning> {
     };
     let channels = aligned.channels.iter();
     channels.filter_map(of_channel).flatten().collect()
+}
+
+/// Warnings about values that are held, of channels sampled together.
+pub(crate) fn repeated(aligned: &AlignedChannels) -> Vec<Warning> {
+    let axis = TimeAxis::uniform(aligned.rate_hz, aligned.start);
+    let of_channel = |channel: &Channel| repeats_of(&channel.name, &channel.samples, &axis);
+    aligned.channels.iter().filter_map(of_channel).collect()
 }
 
 /// Warning about constant channels.

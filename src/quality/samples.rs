@@ -253,6 +253,12 @@ fn spiked(name: &str, unit: &str, found: &Spikes, axis: &TimeAxis) -> Warning {
     )
 }
 
+/// Warning about samples that repeat more often than the resolution explains.
+pub fn repeats_of(name: &str, samples: &[f64], axis: &TimeAxis) -> Option<Warning> {
+    let found = repeats(samples).filter(|r| r.unexplained == Some(true));
+    found.map(|found| repeated(name, &found, axis))
+}
+
 fn repeated(name: &str, found: &Repeats, axis: &TimeAxis) -> Warning {
     let percent = rounded(100.0 * found.fraction, 3);
     let rate = axis.rate_hz.map_or_else(String::new, |rate_hz| {

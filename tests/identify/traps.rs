@@ -268,6 +268,25 @@ fn rings_right(report: &Value, ratio: f64) {
     assert_close(parameter(report, "damping_ratio").0, ratio, 0.01);
 }
 
+/// The images of a channel that is refreshed with each third to tenth sample had been modes, without a word.
+#[test]
+fn held_samples_have_no_modes_of_their_own() {
+    for (seed, hold) in (40..).zip([3, 5, 10]) {
+        let fine = ringing(&[(0.1, 1.0)], 0.015, 8_000, seed);
+        let held: Vec<f64> = (0..fine.len()).map(|i| fine[i / hold * hold]).collect();
+        let report = decayed(&[held]);
+        rings_right(&report, 0.015);
+        let count = |name: &str| {
+            let all = report["parameters"].as_array().unwrap();
+            all.iter()
+                .filter(|p| p["name"].as_str().unwrap().contains(name))
+                .count()
+        };
+        assert_eq!(count("natural_frequency"), 1, "{report}");
+        assert!(codes(&report).contains(&"repeated-samples"), "{report}");
+    }
+}
+
 #[test]
 fn a_second_hit_within_a_decay_is_named() {
     for ratio in [0.005, 0.015, 0.03] {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use torqcomp_dsp::sort_by_number;
 
 use torqcomp_dsp::quality::clipping::Clipping;
+use torqcomp_dsp::quality::repeats::repeats;
 
 use super::arrivals::{self, EvenTimes};
 use super::constants::{Ratios, from_ratios};
@@ -138,12 +139,14 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
     let clipped = Clipping::of(&chosen.samples)
         .map(|found| quality::clipped_ends(&chosen.name, &unit, &found, &chosen.axis));
     let clipped = clipped.unwrap_or_default();
+    let held = quality::repeats_of(&chosen.name, &chosen.samples, &chosen.axis);
     let jitter = jitter(chosen, &args.reading);
     let jitters = !jitter.is_empty();
     let warnings = [
         recording.all_warnings(),
         selection.warnings,
         clipped,
+        held.into_iter().collect(),
         jitter,
     ];
     let warnings = warnings.concat();
@@ -151,7 +154,7 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
     // Frees the other channels before the fit.
     let channel = recording.channels.swap_remove(place);
     drop(recording);
-    let (times_s, values, rate_hz) = ringing(channel, clock, rate_hz.is_some());
+    let (times_s, values, rate_hz) = new_values(ringing(channel, clock, rate_hz.is_some()));
     recorded.add(input, values.len(), rate_hz.map(|hz| (hz, rate_std_hz)));
     Ok(Loaded {
         name: input.shown().to_string(),
@@ -163,13 +166,32 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
     })
 }
 
+/// Times and samples of a decay, and its rate if the times are uniform.
+type Uniform = (Vec<f64>, Vec<f64>, Option<f64>);
+
+/// The samples that are new, where every value is held for the same number of samples: the images of the staircase look
+/// like modes.
+fn new_values((times_s, values, rate_hz): Uniform) -> Uniform {
+    let hold = rate_hz.and_then(|_| repeats(&values)?.hold);
+    let Some(hold) = hold else {
+        return (times_s, values, rate_hz);
+    };
+    let mut changes = vec![0_usize; hold];
+    for i in (1..values.len()).filter(|i| values[*i] != values[i - 1]) {
+        changes[i % hold] += 1;
+    }
+    let first = (0..hold).max_by_key(|phase| changes[*phase]).unwrap_or(0);
+    let of_new = |all: &[f64]| all.iter().skip(first).step_by(hold).copied().collect();
+    (
+        of_new(&times_s),
+        of_new(&values),
+        rate_hz.map(|hz| hz / hold as f64),
+    )
+}
+
 /// Times and samples of a channel with a start time and rate, and the rate if the times are uniform; a given rate
 /// replaces the time stamps.
-fn ringing(
-    channel: Channel,
-    (start_s, rate_hz): (f64, f64),
-    is_given: bool,
-) -> (Vec<f64>, Vec<f64>, Option<f64>) {
+fn ringing(channel: Channel, (start_s, rate_hz): (f64, f64), is_given: bool) -> Uniform {
     let samples = channel.samples;
     let stamps = channel.axis.stamps_s.filter(|_| !is_given);
     let is_grid = stamps

@@ -36,6 +36,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         );
         recorded.warn(read.warnings.clone(), read.is_lossy);
         recorded.warn(quality::clipped(&read), false);
+        recorded.warn(quality::repeated(&read), false);
         if let Some(radius) = &args.radius {
             to_torque(&mut read.channels[0], radius)?;
         }
