@@ -13,6 +13,7 @@ mod many;
 mod merge;
 mod predict;
 mod rows;
+mod same;
 pub(crate) mod schema;
 mod simulate;
 mod table;

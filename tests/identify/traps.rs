@@ -268,6 +268,20 @@ fn rings_right(report: &Value, ratio: f64) {
     assert_close(parameter(report, "damping_ratio").0, ratio, 0.01);
 }
 
+/// The uncertainties had been too small by the square root of two, without a word.
+#[test]
+fn a_record_given_twice_is_named() {
+    let [one, other] = [1, 2].map(|seed| ringing(&[(0.1, 1.0)], 0.015, 8_000, seed));
+    for (records, is_twice) in [([one.clone(), one.clone()], true), ([one, other], false)] {
+        let report = decayed(&records);
+        assert_eq!(
+            codes(&report).contains(&"identical-files"),
+            is_twice,
+            "{report}"
+        );
+    }
+}
+
 /// The images of a channel that is refreshed with each third to tenth sample had been modes, without a word.
 #[test]
 fn held_samples_have_no_modes_of_their_own() {

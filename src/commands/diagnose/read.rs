@@ -9,7 +9,7 @@ use torqcomp_model::{Dimension, Estimate, UnitSystem};
 use super::declared::{declared, declared_effects, measures, recorder, several, torques_unknown};
 use super::{decays, loads, memory, running};
 use crate::cli::Diagnose;
-use crate::commands::convert;
+use crate::commands::{convert, same};
 use crate::diagnose::{
     Case, ChannelUnits, InitialState, KnownLoads, Records, RunningRecord, SourceFiles, StandRecord,
 };
@@ -120,6 +120,7 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<ReadCase, Failure>
         train: convert(train)?,
         holdout: convert(holdout)?,
     };
+    warnings.extend(same::files(&args.training_files()).0);
     warnings.extend(held_out_instead(&mut records, last_is_held_out));
     let several = stand.map(several).transpose()?.flatten();
     let measures = stand.map_or(Ok(Motion::Displacement), measures)?;

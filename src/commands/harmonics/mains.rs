@@ -6,6 +6,8 @@ use crate::warning::Warning;
 
 /// Mains orders checked.
 const MAINS_LINES: f64 = 5.0;
+/// Largest relative difference of a frequency from that of the mains for both to be called the same.
+const OFF: f64 = 0.01;
 /// Mains frequencies.
 const GRIDS_HZ: [f64; 2] = [50.0, 60.0];
 
@@ -26,11 +28,19 @@ pub(super) fn warning(components: &[ComponentTorque], duration_s: f64) -> Option
     let fundamental_hz = components.first().map(|c| c.frequency_hz / c.order)?;
     let of_grid = |grid_hz: &f64| (fundamental_hz - grid_hz).abs() < 1.0 / duration_s;
     if let Some(grid_hz) = GRIDS_HZ.into_iter().find(of_grid) {
+        let which = match (fundamental_hz - grid_hz).abs() < OFF * grid_hz {
+            true => format!("the fundamental is that of {grid_hz} Hz mains"),
+            false => format!(
+                "{} s do not separate the fundamental of {} Hz from {grid_hz} Hz mains",
+                short(duration_s),
+                short(fundamental_hz)
+            ),
+        };
         return Some(Warning::new(
             "order-or-mains",
             format!(
-                "the fundamental is that of {grid_hz} Hz mains, so any order may contain mains pickup: record once \
-                 with the motor off and the supply on, and subtract its lines"
+                "{which}, so any order may contain mains pickup: record once with the motor off and the supply on, and \
+                 subtract its lines"
             ),
         ));
     }

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 use torqcomp_model::{Dimension, Kind, UnitSystem};
 
-use super::{Outcome, conclude};
+use super::{Outcome, conclude, same};
 use crate::cli::identify::{Findings, Identify, Test};
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::{self, ShowPath, is_dash};
@@ -116,6 +116,7 @@ fn deliver(
     result.rate_hz = recorded.rate_hz;
     result.rate_std_hz = recorded.rate_std_hz;
     result.warnings.extend(recorded.warnings);
+    result.warnings.extend(same::files(&recorded.inputs).0);
     result.convert(UnitSystem::from(findings.units));
     let mut targets = Targets::open(findings, &recorded.inputs)?;
     if let Some(stand) = &mut targets.stand {

@@ -5,7 +5,6 @@ mod describe;
 mod messages;
 mod plot;
 mod report;
-mod same;
 mod text;
 mod whole;
 
@@ -14,7 +13,7 @@ use std::path::{Path, PathBuf};
 use self::content::Content;
 pub(super) use self::report::InspectReport;
 use self::report::{ChannelWarning, Inspected};
-use super::{Outcome, made, many};
+use super::{Outcome, made, many, same};
 use crate::batch;
 use crate::cli::Inspect;
 use crate::failure::{ErrorCode, Failure};
