@@ -148,22 +148,27 @@ pub fn heading(text: &str) -> Heading {
 /// Words between a name and its unit.
 const BEFORE_UNITS: [&str; 3] = [" in ", " en ", " em "];
 
-/// Name and unit of a heading that ends in a ratio of voltages or lengths, whose slash does not separate a name
-/// from a unit: `bridge mV/V`, `eps_µm/m`.
+/// Name and unit of a heading that ends in a ratio of voltages or lengths, or in a speed or an acceleration, whose slash
+/// does not separate a name from a unit: `bridge mV/V`, `eps_µm/m`, `vel_mm/s`.
 fn ratio(text: &str) -> Option<(&str, NamedUnit)> {
     let above = text.rfind('/')?;
     let start = text[..above].trim_end().rfind([' ', '_', ',', ';', ':'])?;
     let unit = read(&text[start + 1..])?;
+    let of_motion = ["m/s", "m/s^2", "rad/s", "rad/s^2"].map(Unit::parse);
+    let mut of_motion = of_motion.iter().flatten().map(Unit::dimension);
+    let is_motion = of_motion.any(|dimension| dimension == unit.unit.dimension());
+    // n_1/min is a speed, but U_1/mV a voltage.
+    let is_counted = text[start + 1..].starts_with(|c: char| c.is_ascii_digit());
     let is_ratio = matches!(
         unit.unit.ratio_of(),
         Some(RatioOf::Voltages | RatioOf::Lengths)
-    );
+    ) || is_motion && (!is_counted || is_speed(&text[start + 1..]));
     let name = text[..start].trim_end_matches([' ', '_', ',', ';', ':']);
     let mut words = BEFORE_UNITS.iter().map(|word| word.trim_end());
     let name = words
         .find_map(|word| name.strip_suffix(word))
         .unwrap_or(name);
-    (is_ratio && !name.is_empty()).then(|| (name.trim(), unit))
+    (is_ratio && !name.is_empty() && !name.ends_with('/')).then(|| (name.trim(), unit))
 }
 
 /// Whether a unit can follow a text: not after a number (`lowpass 100 Hz`, `M/10^-3 Nm`) nor a word that requires more
@@ -378,6 +383,14 @@ mod tests {
             ("Speed r/min", "Speed", Some("r/min"), true),
             ("n / r/min", "n", Some("r/min"), true),
             ("Weg s/mm", "Weg s", Some("mm"), true),
+            ("acc_m/s2", "acc", Some("m/s2"), true),
+            ("acc m/s2", "acc", Some("m/s2"), true),
+            ("vel_mm/s", "vel", Some("mm/s"), true),
+            ("vel_mm_s", "vel", Some("mm/s"), true),
+            ("omega_deg/s", "omega", Some("deg/s"), true),
+            ("n_1/min", "n", Some("1/min"), true),
+            ("U_1/mV", "U_1", Some("mV"), true),
+            ("F_N/kN", "F_N", Some("kN"), true),
             ("bridge mV/V", "bridge", Some("mV/V"), true),
             ("bridge_mV/V", "bridge", Some("mV/V"), true),
             ("bridge_mv_v", "bridge", Some("mV/V"), true),
