@@ -89,8 +89,8 @@ const FULL_FIT: FitEffort = FitEffort::full(15);
 /// Maximum number of successive full fits, and ratio of successive sums of squares above which they end.
 const MOST_FULL_FITS: usize = 4;
 const FALLING: f64 = 0.9;
-/// Initial fractions of the records for the first fits of a stand with several modes. The plain stand's constants may be
-/// far from those beside the effect, and iterations at the beginnings cost little.
+/// Initial fractions of the records for the first fits of a stand with several modes. The plain stand's constants may
+/// be far from those beside the effect, and iterations at the beginnings cost little.
 const BEGINNINGS: [(f64, FitEffort); 3] = [
     (0.03, FitEffort::brief(8)),
     (0.1, FitEffort::brief(8)),
@@ -118,8 +118,8 @@ pub const FOR_FIRST_EFFECT: SearchEffort = SearchEffort {
     full: 12,
     promising: 0.5,
 };
-/// The second start of a form hardly ever leads farther than the first here. With an accepted effect, the gain of a first fit predicts that of the last one less well: all parameters must move
-/// together.
+/// The second start of a form hardly ever leads farther than the first here. With an accepted effect, the gain of a
+/// first fit predicts that of the last one less well: all parameters must move together.
 const FOR_SECOND_EFFECT: SearchEffort = SearchEffort {
     starts: 1,
     first: usize::MAX,

@@ -120,7 +120,6 @@ pub fn read(args: &Diagnose, stand: Option<&Stand>) -> Result<ReadCase, Failure>
         train: convert(train)?,
         holdout: convert(holdout)?,
     };
-    warnings.extend(same::files(&args.training_files()).0);
     warnings.extend(held_out_instead(&mut records, last_is_held_out));
     let several = stand.map(several).transpose()?.flatten();
     let measures = stand.map_or(Ok(Motion::Displacement), measures)?;
@@ -173,6 +172,9 @@ fn stand_warnings(
 /// The training and hold-out records, the known loads and the running records, all of one kind.
 fn all_pairs(args: &Diagnose) -> Result<[Vec<Pair>; 4], Failure> {
     let (mut train, mut holdout) = pairs(args)?;
+    train[0]
+        .warnings
+        .extend(same::files(&args.training_files()).0);
     let loads = loads::pairs(args)?;
     if let (Some(load), true) = (loads.first(), args.train.is_empty()) {
         // They determine the unit of the gain.

@@ -20,11 +20,57 @@ use crate::unit::NamedUnit;
 
 /// Runs the test.
 pub fn run(args: &Response) -> Result<Outcome, Failure> {
+    let mut recorded = Recorded::default();
+    let loaded = load(args, &mut recorded)?;
+    let names = file_name::texts(&args.inputs);
+    let records: Vec<Driven> = loaded
+        .iter()
+        .zip(&names)
+        .map(|(l, name)| Driven {
+            name,
+            rate_hz: l.rate_hz,
+            applied: &l.channels[0].samples,
+            measured: &l.channels[1].samples,
+        })
+        .collect();
+    let unit = loaded[0].channels[1].unit.as_ref();
+    let motion = motion_of(args, &loaded[0].channels[1].name, unit)?;
+    let mut result = identify(&records, &options(args, motion))?;
+    // A clipped resonance looks like noise before it.
+    if recorded.warnings.iter().any(|w| w.code == "clipped") {
+        result
+            .warnings
+            .retain(|w| w.code != "noise-before-resonance");
+    }
+    if let (Some(fit), Some(unit)) = (&mut result.fit, unit) {
+        fit.unit.clone_from(&unit.text);
+    }
+    name_gain(&mut result, &loaded[0]);
+    let units = [1, 0].map(|k| loaded[0].channels[k].unit.as_ref());
+    if let [Some(measured), Some(applied)] = units {
+        let unit = format!("({})/({})", measured.text, applied.text);
+        result.label_charts(RATIO, &unit);
+    }
+    let source = format!("identify response: {}", file_name::list(&args.inputs));
+    let written = modes::WrittenModes {
+        source,
+        motion,
+        units,
+    };
+    let mut entries = match result.shares.take() {
+        Some(shares) => written.entries(&shares, &args.findings, &result)?,
+        None => entries(args, rad_per_n_m(args, &loaded, motion)?, &mut result)?,
+    };
+    entries.extend(calibration(args, units, &mut result)?);
+    deliver(result, recorded, &args.findings, &entries)
+}
+
+/// The records, all in the units of the first.
+fn load(args: &Response, recorded: &mut Recorded) -> Result<Vec<AlignedChannels>, Failure> {
     let choices = ChannelChoice::applied_and_measured(
         [&args.applied, &args.measured],
         [args.applied_unit.as_deref(), args.measured_unit.as_deref()],
     );
-    let mut recorded = Recorded::default();
     let mut loaded: Vec<AlignedChannels> = Vec::new();
     for input in &args.inputs {
         let mut read = AlignedChannels::read(&Input::of(input), &choices, &args.reading)?;
@@ -45,44 +91,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         }
         loaded.push(read);
     }
-    let names = file_name::texts(&args.inputs);
-    let records: Vec<Driven> = loaded
-        .iter()
-        .zip(&names)
-        .map(|(l, name)| Driven {
-            name,
-            rate_hz: l.rate_hz,
-            applied: &l.channels[0].samples,
-            measured: &l.channels[1].samples,
-        })
-        .collect();
-    let unit = loaded[0].channels[1].unit.as_ref();
-    let motion = motion_of(args, &loaded[0].channels[1].name, unit)?;
-    let mut result = identify(&records, &options(args, motion))?;
-    // A clipped resonance looks like noise before it.
-    let is_clipped = recorded.warnings.iter().any(|w| w.code == "clipped");
-    let warnings = &mut result.warnings;
-    warnings.retain(|w| !is_clipped || w.code != "noise-before-resonance");
-    if let (Some(fit), Some(unit)) = (&mut result.fit, unit) {
-        fit.unit.clone_from(&unit.text);
-    }
-    name_gain(&mut result, &loaded[0]);
-    let units = [1, 0].map(|k| loaded[0].channels[k].unit.as_ref());
-    if let [Some(measured), Some(applied)] = units {
-        let unit = format!("({})/({})", measured.text, applied.text);
-        result.label_charts(RATIO, &unit);
-    }
-    let written = modes::WrittenModes {
-        source: format!("identify response: {}", file_name::list(&args.inputs)),
-        motion,
-        units,
-    };
-    let mut entries = match result.shares.take() {
-        Some(shares) => written.entries(&shares, &args.findings, &result)?,
-        None => entries(args, rad_per_n_m(args, &loaded, motion)?, &mut result)?,
-    };
-    entries.extend(calibration(args, units, &mut result)?);
-    deliver(result, recorded, &args.findings, &entries)
+    Ok(loaded)
 }
 
 /// Motion quantity of the measured channel.

@@ -192,22 +192,13 @@ pub fn identify(
     zero::drifting(&mut result, &fit, points, (largest, &units.reading));
     result.fit = Some(quality);
     let of_plateaus = plateaus.as_ref().map(|p| p.method(&units.load));
-    result.method.extend(of_plateaus);
-    result
-        .method
-        .extend(ramp.as_ref().map(RampReadings::method));
+    let of_ramp = ramp.as_ref().map(RampReadings::method);
+    result.method.extend(of_plateaus.into_iter().chain(of_ramp));
     method(&mut result, &fit, points, &units.reading);
     result.terms = terms::terms(points, &steps, &curve);
     result.steps = calibration_points(points, &steps, &fit);
     draw(&mut result, points, &curve, units);
-    warnings(&mut result, points, (degree, &steps));
-    if is_one_weight {
-        result.warn(
-            "one-weight",
-            "a single load besides zero does not reveal a nonlinear characteristic; apply further loads, or stay near \
-             this one",
-        );
-    }
+    warnings(&mut result, points, (degree, is_one_weight, &steps));
     Ok(result)
 }
 
@@ -428,7 +419,11 @@ fn poor(result: &mut Identification, relative: f64) {
 }
 
 /// Warns about unidentifiable terms, and the validity of the constants.
-fn warnings(result: &mut Identification, points: &[Point], (degree, steps): (usize, &LoadSteps)) {
+fn warnings(
+    result: &mut Identification,
+    points: &[Point],
+    (degree, is_one_weight, steps): (usize, bool, &LoadSteps),
+) {
     if points.iter().all(|p| p.series == 0) {
         let has_empty = points.iter().any(|p| p.load.abs() <= NONE * steps.largest);
         result.warn(
@@ -452,6 +447,13 @@ fn warnings(result: &mut Identification, points: &[Point], (degree, steps): (usi
         result.warn(
             "curve",
             "the constants are the slope of the curve at no load; for large loads use the curve",
+        );
+    }
+    if is_one_weight {
+        result.warn(
+            "one-weight",
+            "a single load besides zero does not reveal a nonlinear characteristic; apply further loads, or stay near \
+             this one",
         );
     }
 }

@@ -63,9 +63,9 @@ pub(super) fn refuse_mixed(head: &Head, table: &Table) -> Result<(), Failure> {
     Err(Failure::failed(
         ErrorCode::TextUnclear,
         format_args!(
-            "the {mark} in \"{shown}\" stands before three digits in every row of its column, while others have a decimal \
-             {decimal}: it can be a decimal mark or stand between thousands. If it stands between thousands, say so with \
-             --decimal {}; otherwise write the same decimal mark in all columns",
+            "the {mark} in \"{shown}\" stands before three digits in every row of its column, while others have a \
+             decimal {decimal}: it can be a decimal mark or stand between thousands. If it stands between thousands, \
+             say so with --decimal {}; otherwise write the same decimal mark in all columns",
             char::from(table.dialect.decimal)
         ),
     )

@@ -148,8 +148,8 @@ pub fn heading(text: &str) -> Heading {
 /// Words between a name and its unit.
 const BEFORE_UNITS: [&str; 3] = [" in ", " en ", " em "];
 
-/// Name and unit of a heading that ends in a ratio of voltages or lengths, or in a speed or an acceleration, whose slash
-/// does not separate a name from a unit: `bridge mV/V`, `eps_µm/m`, `vel_mm/s`.
+/// Name and unit of a heading that ends in a ratio of voltages or lengths, or in a speed or an acceleration, whose
+/// slash does not separate a name from a unit: `bridge mV/V`, `eps_µm/m`, `vel_mm/s`.
 fn ratio(text: &str) -> Option<(&str, NamedUnit)> {
     let above = text.rfind('/')?;
     let start = text[..above].trim_end().rfind([' ', '_', ',', ';', ':'])?;

@@ -26,11 +26,11 @@ const SHORTEST: usize = 3;
 /// Detects clipping of a signal at a level before a little noise was added to it.
 ///
 /// The range is divided into 256 parts (64, if the noise is larger). Its outermost part contains a clipping level if
-/// 1. it has more than 4 times the samples of the adjacent part, and 0.1 % of all: of a sine of amplitude `A`, a fraction
-///    `arccos(1 − w/A)/π` lies within `w` of the peak, 2.4 times as many as in the next `w`;
+/// 1. it has more than 4 times the samples of the adjacent part, and 0.1 % of all: of a sine of amplitude `A`, a
+///    fraction `arccos(1 − w/A)/π` lies within `w` of the peak, 2.4 times as many as in the next `w`;
 /// 2. at least 3 runs of samples in it are longer than twice the 95th percentile of the runs in the other parts of the
-///    outermost quarter of the range, and none of those is as long as the longest: a signal that rests at several levels
-///    is not clipped at the last of them;
+///    outermost quarter of the range, and none of those is as long as the longest: a signal that rests at several
+///    levels is not clipped at the last of them;
 /// 3. one in three of these runs is both entered and left in full motion, by the criterion of
 ///    [`clipping`](fn@super::clipping::clipping) with a tolerance of 4 parts.
 ///

@@ -21,7 +21,8 @@ use crate::warning::Warning;
 use groups::{Group, groups};
 pub use stamps::StampRule;
 
-/// Largest relative difference of a header rate from that of the stamps, or from another one, for both to mean the same.
+/// Largest relative difference of a header rate from that of the stamps, or from another one, for both to mean the
+/// same.
 const SAME: f64 = 0.02;
 /// Relative difference of the two explained by rounding of the stamps.
 const ROUNDED: f64 = 1e-6;
