@@ -94,6 +94,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["at-bound", "a parameter lies at its bound: it is not identifiable from these data", "omit it, or record data that determine it"],
         ["channels-shifted", "one channel lags the other; the delay was fitted", "record both with one recorder and the same filters"],
         ["close-lines", "the residual has a line close to the mode", "try --modes"],
+        ["overtone", "a mode has two or three times the frequency and the decay rate of the strongest: it is distortion", "hit more softly, or use a later part with --range"],
         ["crowded-modes", "many modes lie close to the strongest one, as where a mode with dry friction rings beside another", "filter the other mode out with the upper end of --band"],
         ["curve", "the readings follow a curve, so the constants are valid at no load only", "use the curve at large loads"],
         ["decays-apart", "decays ring at different frequencies: the stand was changed, or they are of two stands", "identify them one by one"],

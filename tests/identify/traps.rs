@@ -268,6 +268,32 @@ fn rings_right(report: &Value, ratio: f64) {
     assert_close(parameter(report, "damping_ratio").0, ratio, 0.01);
 }
 
+/// tanh adds x³, with three times the frequency and the decay rate; it had been a mode, beside a damping ratio 4 % off.
+#[test]
+fn distortion_is_no_mode() {
+    for (part, is_said) in [(1.0, true), (0.3, true), (0.0, false)] {
+        let mut noise = Noise(77);
+        let [main, other] = [(0.02, 180.0, 1.0), (0.015, 520.0, 0.03)].map(|(ratio, hz, size)| {
+            let omega = TAU * hz;
+            move |t: f64| size * (-ratio * omega * t).exp() * (omega * t).sin()
+        });
+        let value = |i: usize| {
+            let t = i as f64 / RATE_HZ;
+            match part {
+                0.0 => main(t) + other(t),
+                part => (part * main(t)).tanh() / part,
+            }
+        };
+        let record = (0..5000).map(|i| value(i) + 1e-4 * noise.normal());
+        let report = decayed(&[record.collect()]);
+        assert_eq!(
+            codes(&report).contains(&"overtone"),
+            is_said,
+            "{part}: {report}"
+        );
+    }
+}
+
 /// The uncertainties had been too small by the square root of two, without a word.
 #[test]
 fn a_record_given_twice_is_named() {

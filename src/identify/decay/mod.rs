@@ -107,6 +107,7 @@ fn evaluated(
     dependence::amplitude_dependence(&mut result, &fit, &stretches, order[0]);
     present::apart(&mut result, &fit, stretches.len());
     present::crowded(&mut result, &fit, order[0]);
+    present::overtones(&mut result, &fit, order[0], stretches.len());
     present::poor(&mut result, &fit, &stretches, (order[0], has_baseline));
     by_hand::compare(&mut result, &fit, &stretches, order[0]);
     present::draw(&mut result, &fit, &stretches);
