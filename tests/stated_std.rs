@@ -145,6 +145,45 @@ fn an_effect_that_bends_is_part_of_the_uncertainty() {
     );
 }
 
+/// A threshold that may be on the other side of zero is varied away from it only; the negative one had been a crash. The
+/// stop: `T = y + 2 (y − g)` beyond `g`, none of it without the stop.
+#[test]
+fn a_threshold_less_certain_than_its_value_is_varied_to_one_side() {
+    let stiff = MECHANICS.replace("590 Hz\", std = \"2 Hz", "590 Hz\", std = \"0.001 Hz");
+    for (effect, of) in [
+        (
+            "end-stop\"\nform = \"both\"\nstiffness_ratio = 2\ngap",
+            "gap of end-stop",
+        ),
+        ("backlash\"\nform = \"gap\"\ngap", "gap of backlash"),
+        (
+            "backlash\"\nform = \"soft-gap\"\nsoftening = 0.5\ngap",
+            "gap of backlash",
+        ),
+        (
+            "saturation\"\nform = \"hard\"\nlimit",
+            "limit of saturation",
+        ),
+    ] {
+        let folder = folder("T [N m]", "");
+        let value = "{ value = \"2.5 N m\", std = \"4 N m\" }";
+        folder.write(
+            "stand.toml",
+            format!("{stiff}[[effects]]\nkind = \"{effect} = {value}\n"),
+        );
+        let report = folder.json(&[&COMPENSATE[..], &["--json", "--band", "200"]].concat());
+        let found = &report["result_std"];
+        let bent = found["bent"].as_array().unwrap();
+        let one_sided =
+            bent.contains(&of.into()) || found["left_out"].as_array().unwrap().contains(&of.into());
+        assert!(one_sided, "{effect}: {found}");
+        if effect.contains("both") {
+            // At most 2 (3 − 2.5), where the stop is not reached with the larger gap.
+            assert_close(found["largest"].as_f64().unwrap(), 1.0, 0.05);
+        }
+    }
+}
+
 #[test]
 fn a_torque_far_off_the_rated_one_is_warned_about() {
     let with_code = |code: &str, more: &str| -> Vec<bool> {

@@ -78,10 +78,10 @@ impl Spread<'_> {
         let mut kept = Vec::new();
         for constant in varied {
             let name = self.name(constant);
-            match self.sides(constant) {
-                Some(sides) => {
+            match self.sides(constant, &middle) {
+                Some((sides, are_both)) => {
                     let term = half_difference(&sides);
-                    if bend(&sides, &middle) > STRAIGHT * rms(&term) {
+                    if !are_both || bend(&sides, &middle) > STRAIGHT * rms(&term) {
                         found.bent.push(name);
                     }
                     terms.push(term);
@@ -128,12 +128,23 @@ impl Spread<'_> {
         Ok(undone.applied)
     }
 
-    /// The record inverted with a constant varied in both directions.
-    fn sides(&self, constant: VariedConstant) -> Option<[Vec<f64>; 2]> {
-        let side = |by: f64| self.back(&self.stand.moved(constant, by)?, 1.0).ok();
-        let [low, high] = [side(-1.0)?, side(1.0)?];
-        let is_finite = low.iter().chain(&high).all(|v| v.is_finite());
-        is_finite.then_some([low, high])
+    /// The record inverted with a constant varied in both directions, and whether both exist: a constant less certain
+    /// than its distance from its bound is varied away from that only.
+    fn sides(&self, constant: VariedConstant, middle: &[f64]) -> Option<([Vec<f64>; 2], bool)> {
+        let side = |by: f64| {
+            let side = self.back(&self.stand.moved(constant, by)?, 1.0).ok()?;
+            side.iter().all(|v| v.is_finite()).then_some(side)
+        };
+        let opposite = |side: &[f64]| -> Vec<f64> {
+            let pairs = side.iter().zip(middle);
+            pairs.map(|(side, middle)| 2.0 * middle - side).collect()
+        };
+        match [side(-1.0), side(1.0)] {
+            [Some(low), Some(high)] => Some(([low, high], true)),
+            [Some(low), None] => Some(([low.clone(), opposite(&low)], false)),
+            [None, Some(high)] => Some(([opposite(&high), high], false)),
+            [None, None] => None,
+        }
     }
 
     /// Contribution of the calibration constant: a static gain divides the result, a calibration scales the record.

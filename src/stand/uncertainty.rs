@@ -155,7 +155,9 @@ impl Stand {
             }
             VariedConstant::OfEffect(place, k) => {
                 let effect = &mut stand.effects[place];
-                effect.values[k] += by * effect.stds[k]?;
+                let moved = effect.values[k] + by * effect.stds[k]?;
+                effect.values[k] =
+                    Some(moved).filter(|v| effect.form.parameters[k].allows_sign_of(*v))?;
             }
         }
         Some(stand)

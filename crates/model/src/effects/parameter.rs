@@ -65,6 +65,12 @@ pub struct RecordScales {
 }
 
 impl EffectParameter {
+    /// Whether a value has a sign that its bounds allow: a gap or a limit is not negative.
+    #[must_use]
+    pub fn allows_sign_of(&self, value: f64) -> bool {
+        (self.lower < 0.0 || value >= 0.0) && (self.upper > 0.0 || value <= 0.0)
+    }
+
     /// A dimensionless parameter.
     #[must_use]
     pub const fn number(name: &'static str, lower: f64, upper: f64) -> Self {
