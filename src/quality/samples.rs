@@ -262,8 +262,15 @@ pub fn repeats_of(name: &str, samples: &[f64], axis: &TimeAxis) -> Option<Warnin
 fn repeated(name: &str, found: &Repeats, axis: &TimeAxis) -> Warning {
     let percent = rounded(100.0 * found.fraction, 3);
     let rate = axis.rate_hz.map_or_else(String::new, |rate_hz| {
+        let late = found.hold.map_or_else(String::new, |hold| {
+            let late_s = 0.5 * (hold as f64 - 1.0) / rate_hz;
+            format!(
+                ", so that the record is late by {} s on average",
+                rounded(late_s, 3)
+            )
+        });
         format!(
-            "; new values come at about {} Hz, not {} Hz",
+            "; new values come at about {} Hz, not {} Hz{late}",
             rounded(found.fresh * rate_hz, 3),
             short(rate_hz)
         )
