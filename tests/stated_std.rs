@@ -145,8 +145,8 @@ fn an_effect_that_bends_is_part_of_the_uncertainty() {
     );
 }
 
-/// A threshold that may be on the other side of zero is varied away from it only; the negative one had been a crash. The
-/// stop: `T = y + 2 (y − g)` beyond `g`, none of it without the stop.
+/// A threshold that may be on the other side of zero is varied away from it only; the negative one had been a crash.
+/// The stop: `T = y + 2 (y − g)` beyond `g`, none of it without the stop.
 #[test]
 fn a_threshold_less_certain_than_its_value_is_varied_to_one_side() {
     let stiff = MECHANICS.replace("590 Hz\", std = \"2 Hz", "590 Hz\", std = \"0.001 Hz");

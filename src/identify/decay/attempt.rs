@@ -161,8 +161,8 @@ impl<'a> Attempt<'a> {
         Ok(true)
     }
 
-    /// Whether a fit whose last mode is close to another describes two modes of the stand: resolved, of comparable size,
-    /// and without a further line beside them, as a frequency that changes with the amplitude would leave.
+    /// Whether a fit whose last mode is close to another describes two modes of the stand: resolved, of comparable
+    /// size, and without a further line beside them, as a frequency that changes with the amplitude would leave.
     fn is_pair(&self, next: &ModesFit, stretches: &[Stretch]) -> Result<bool, FitError> {
         let Some((last, others)) = next.poles.split_last() else {
             return Ok(false);

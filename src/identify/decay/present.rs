@@ -190,9 +190,9 @@ pub(super) fn overtones(
         result.warn(
             "overtone",
             format!(
-                "the mode at {} Hz has {order} times the frequency and about {order} times the decay rate of that at {} Hz: \
-                 it is probably no mode, but distortion by an amplifier near its limit or a spring that is not linear, \
-                 which makes the damping wrong as well; hit more softly, or use a later part with --range",
+                "the mode at {} Hz has {order} times the frequency and about {order} times the decay rate of that at \
+                 {} Hz: it is probably no mode, but distortion by an amplifier near its limit or a spring that is not \
+                 linear, which makes the damping wrong as well; hit more softly, or use a later part with --range",
                 rounded(pole.frequency_hz(), 5),
                 rounded(of.frequency_hz(), 5)
             ),
