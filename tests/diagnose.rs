@@ -545,3 +545,42 @@ fn answers_do_not_depend_on_the_scale_of_time_and_torque() {
         assert!((ratio - 1.0).abs() < 0.01, "{stretch} {size}: {ratio}");
     }
 }
+
+/// An amplifier whose slew rate is limited follows the motion of the hold-out record. The plain stand explains that to
+/// the noise, and "nothing-missing" had been the verdict, with several times the noise in the training record.
+#[test]
+fn what_acts_in_the_training_record_only_is_missing() {
+    let case = make(7, "none", 0).expect("the catalogue has it");
+    for (part, verdict) in [(f64::INFINITY, "nothing-missing"), (0.7, "unexplained")] {
+        let folder = folder(&case);
+        let text = folder.read("train.csv");
+        let (head, rows) = table(&text);
+        let place = head.iter().position(|h| h.starts_with("measured")).unwrap();
+        let steps = rows.windows(2).map(|w| (w[1][place] - w[0][place]).abs());
+        let most = part * steps.fold(0.0, f64::max);
+        let mut shown = rows[0][place];
+        let limited = rows.iter().map(|row| {
+            shown += (row[place] - shown).clamp(-most, most);
+            let mut row = row.clone();
+            row[place] = shown;
+            let cells: Vec<String> = row.iter().map(f64::to_string).collect();
+            cells.join(",") + "\n"
+        });
+        folder.write(
+            "train.csv",
+            head.join(",") + "\n" + &limited.collect::<String>(),
+        );
+        let report = folder.json(&diagnose(&["--json"]));
+        assert_eq!(
+            report["verdict"], verdict,
+            "{}",
+            report["residual"]["described"]
+        );
+        let said = report["residual"]["described"].as_str().unwrap();
+        assert_eq!(
+            said.contains("noise in the training records"),
+            part < 1.0,
+            "{said}"
+        );
+    }
+}

@@ -327,7 +327,8 @@ fn other_marks_in_some_columns_are_asked_about() {
         let row = |i: i32| format!("0,{i:03};{}\n", value(i));
         (0..400).map(row).collect()
     };
-    let cases: [(fn(i32) -> String, Option<f64>); 4] = [
+    type Cell = fn(i32) -> String;
+    let cases: [(Cell, Option<f64>); 4] = [
         (|i| format!("{}.{:03}", 7 + i % 6, 271 + i), None),
         // Nine hundred is too small for a separator, and millions have two.
         (

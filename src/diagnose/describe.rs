@@ -48,6 +48,7 @@ pub fn residual(
                 .to_owned(),
         );
     }
+    parts.extend(in_training(found));
     if found.after.grows_with_level() {
         parts.push("larger in the records with larger motion, unlike noise".to_owned());
     }
@@ -79,6 +80,16 @@ pub fn residual(
     let line = |line: &SpectralLine| format!("a line at {} Hz", rounded(line.frequency_hz, 5));
     parts.extend(lines.iter().map(line));
     parts.join("; ")
+}
+
+/// An error that only the training records show.
+fn in_training(found: &SearchState) -> Option<String> {
+    let is_plain = found.after.effect_names().is_empty();
+    let ratio = found.left_in_training().filter(|_| is_plain)?;
+    Some(format!(
+        "{} times the noise in the training records: something acts there that the hold-out records do not show",
+        rounded(ratio, 3)
+    ))
 }
 
 /// Spikes of the residual.

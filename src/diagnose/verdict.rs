@@ -50,6 +50,9 @@ const NAMED: f64 = 0.5;
 const CLEARLY_ABOVE: f64 = 1.05;
 /// Ratio of the error to the noise floor above which a remaining dependence on the input counts.
 const ABOVE: f64 = 1.005;
+/// Ratio of the plain stand's error to the noise in the training records, relative to that in the hold-out records,
+/// above which something acts in the training records only.
+const MORE_IN_TRAINING: f64 = 2.0;
 /// 95 % coverage factor for the error due to uncertain constants.
 const CERTAIN: f64 = 2.0;
 /// Minimum fraction of the initial excess error power that a further named effect must explain.
@@ -204,6 +207,16 @@ impl SearchState {
         round.is_some_and(|round| !round.iter().any(CandidateFit::is_confirmed))
     }
 
+    /// The plain stand's error in the training records in terms of their noise, if it is far larger than in the hold-out
+    /// records: an effect of large motion, which smaller motion does not show.
+    pub(super) fn left_in_training(&self) -> Option<f64> {
+        let plain = &self.before;
+        let noise = NoiseFloor::of(&plain.train(), &plain.fitted.passage())?;
+        let ratio = plain.train_rms() / noise.rms;
+        let of_holdout = plain.compared_rms() / self.noise_floor?.rms;
+        (ratio > MORE_IN_TRAINING * of_holdout.max(1.0)).then_some(ratio)
+    }
+
     /// Whether a line is left besides the effects, above the noise and away from the resonance, in which noise has
     /// lines of its own.
     fn leaves_line(&self) -> bool {
@@ -245,6 +258,7 @@ impl SearchState {
         let is_left = is_known_left || self.leaves(&self.after, &self.tests);
         if self.after.effect_names().is_empty() {
             let is_left = self.leaves(&self.before, &self.tests_before);
+            let is_left = is_left || self.left_in_training().is_some();
             let is_missing = is_suspected || is_left || self.is_refuted || is_outdone;
             return match is_missing {
                 true => Verdict::Unexplained,
