@@ -211,9 +211,12 @@ impl SearchState {
     /// records: an effect of large motion, which smaller motion does not show.
     pub(super) fn left_in_training(&self) -> Option<f64> {
         let plain = &self.before;
+        let holdout = self.noise_floor?;
         let noise = NoiseFloor::of(&plain.train(), &plain.fitted.passage())?;
+        // Coloured noise is above one floor, but not above the other.
+        let noise = Some(noise).filter(|noise| noise.from == holdout.from)?;
         let ratio = plain.train_rms() / noise.rms;
-        let of_holdout = plain.compared_rms() / self.noise_floor?.rms;
+        let of_holdout = plain.compared_rms() / holdout.rms;
         (ratio > MORE_IN_TRAINING * of_holdout.max(1.0)).then_some(ratio)
     }
 
