@@ -4,7 +4,6 @@ use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 use std::sync::Arc;
 
-use torqcomp_dsp::dot;
 use torqcomp_fourier::phasors;
 use torqcomp_model::effects::{SpikeMoments, SpikeSearch, SpikeShape};
 use torqcomp_model::simulate::{Excitation, MotionState};
@@ -12,7 +11,6 @@ use torqcomp_model::{Chain, Mode, StandRun};
 
 use super::columns::Columns;
 use super::records::EXCLUDED;
-use super::residual_tests::without_mean;
 use super::whitening::Whitening;
 
 /// State of the stand at the first sample of a record, and of its drive.
@@ -53,17 +51,6 @@ pub struct StandRecord {
     pub is_held: bool,
     /// The filter of its residual, if noise on the applied quantity is weighted.
     pub whitening: Option<Whitening>,
-}
-
-/// RMS of measured records about their means.
-pub fn measured_rms<'a>(records: impl Iterator<Item = &'a StandRecord>) -> f64 {
-    let (mut power, mut count) = (0.0, 0_usize);
-    for record in records {
-        let measured = without_mean(record.measured_in_range());
-        power += dot(&measured, &measured);
-        count += measured.len();
-    }
-    (power / count.max(1) as f64).sqrt()
 }
 
 /// Terms of a model whose phase or magnitude belongs to the record rather than the stand.

@@ -14,7 +14,7 @@ use super::ladder::Ladder;
 use super::moment::ChangedStand;
 use super::noise_floor::NoiseFloorSource;
 use super::reason::Status;
-use super::record::{StandRecord, measured_rms};
+use super::record::StandRecord;
 use super::residual_tests::ResidualTests;
 use super::running::RunningCheck;
 use super::score::{RmsErrors, ScoredModel};
@@ -238,7 +238,7 @@ impl ErrorTable {
         let units = &after.fitted.structure.context.units;
         let size = match &after.fitted.structure.context.held {
             Some(_) => HeldBody::acting_rms(before.compared().iter().map(|r| &r.record)),
-            None => measured_rms(before.compared().iter().map(|r| &r.record)),
+            None => holdout_rms(before),
         };
         let errors = |model: &ScoredModel| ModelErrors {
             rms: model.errors(),
@@ -255,6 +255,19 @@ impl ErrorTable {
             noise_floor_from: found.noise_floor.map(|f| f.from),
         }
     }
+}
+
+/// RMS of the held-out records about their means, without nuisance terms.
+fn holdout_rms(before: &ScoredModel) -> f64 {
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for residual in before.compared().iter() {
+        let pairs = residual.modelled.iter().zip(&residual.samples);
+        let y: Vec<f64> = pairs.map(|(m, r)| m + r).collect();
+        let mean = y.iter().sum::<f64>() / y.len() as f64;
+        sum += y.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
+        count += y.len();
+    }
+    (sum / count as f64).sqrt()
 }
 
 impl ExcitationLevels {

@@ -89,13 +89,8 @@ const FULL_FIT: FitEffort = FitEffort::full(15);
 /// Maximum number of successive full fits, and ratio of successive sums of squares above which they end.
 const MOST_FULL_FITS: usize = 4;
 const FALLING: f64 = 0.9;
-/// Initial fractions of the records for the first fits of a stand with several modes. The plain stand's constants may
-/// be far from those beside the effect, and iterations at the beginnings cost little.
-const BEGINNINGS: [(f64, FitEffort); 3] = [
-    (0.03, FitEffort::brief(8)),
-    (0.1, FitEffort::brief(8)),
-    (0.3, SECOND_FIT),
-];
+/// Initial fractions of the records for the first fits of a stand with several modes.
+const BEGINNINGS: [f64; 3] = [0.03, 0.1, 0.3];
 
 /// Number of forms and starts that advance between the stages of fitting.
 pub struct SearchEffort {
@@ -118,8 +113,8 @@ pub const FOR_FIRST_EFFECT: SearchEffort = SearchEffort {
     full: 12,
     promising: 0.5,
 };
-/// The second start of a form hardly ever leads farther than the first here. With an accepted effect, the gain of a
-/// first fit predicts that of the last one less well: all parameters must move together.
+/// The second start of a form hardly ever leads farther than the first here. With an accepted effect, the gain of a first fit predicts that of the last one less well: all parameters must move
+/// together.
 const FOR_SECOND_EFFECT: SearchEffort = SearchEffort {
     starts: 1,
     first: usize::MAX,
@@ -422,9 +417,9 @@ fn from_beginnings(
     records: &[StandRecord],
 ) -> Result<FittedModel, FitError> {
     let mut values = start.to_vec();
-    for (part, effort) in BEGINNINGS {
+    for part in BEGINNINGS {
         let beginnings: Vec<StandRecord> = records.iter().map(|r| r.beginning(part)).collect();
-        let found = fit(structure, &values, &beginnings, effort)?;
+        let found = fit(structure, &values, &beginnings, FIRST_FIT)?;
         (structure, values) = (found.structure, found.values);
     }
     fit(structure, &values, records, FIRST_FIT)

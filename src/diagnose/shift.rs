@@ -2,9 +2,10 @@
 //! explanation.
 
 use super::alignment::{Alignment, Shift};
-use super::record::{StandRecord, measured_rms};
+use super::record::StandRecord;
 use super::records::Records;
 use super::refuse::{LARGE_ERROR, longest, relative_error};
+use super::residual_tests::without_mean;
 use super::score::ScoredModel;
 use super::structure::FitContext;
 use super::verdict::remains;
@@ -12,6 +13,7 @@ use super::{Case, SearchState};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::{relative, rounded};
 use crate::warning::Warning;
+use torqcomp_dsp::dot;
 
 /// Relative error of the plain stand above which a shift of the channels is considered.
 const NOTABLE_ERROR: f64 = 0.02;
@@ -130,7 +132,12 @@ struct RelativeTo(f64);
 
 impl RelativeTo {
     fn of(records: &[StandRecord]) -> Self {
-        Self(measured_rms(records.iter()))
+        let power = |r: &StandRecord| {
+            let measured = without_mean(r.measured_in_range());
+            dot(&measured, &measured)
+        };
+        let count: usize = records.iter().map(StandRecord::count).sum();
+        Self((records.iter().map(power).sum::<f64>() / count as f64).sqrt())
     }
 
     fn error(&self, model: &ScoredModel) -> f64 {
