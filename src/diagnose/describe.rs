@@ -84,8 +84,10 @@ pub fn residual(
 
 /// An error that only the training records show.
 fn in_training(found: &SearchState) -> Option<String> {
-    let is_plain = found.after.effect_names().is_empty();
-    let ratio = found.left_in_training().filter(|_| is_plain)?;
+    if !found.after.effect_names().is_empty() {
+        return None;
+    }
+    let ratio = found.left_in_training()?;
     Some(format!(
         "{} times the noise in the training records: something acts there that the hold-out records do not show",
         rounded(ratio, 3)

@@ -141,7 +141,10 @@ impl Spread<'_> {
         };
         match [side(-1.0), side(1.0)] {
             [Some(low), Some(high)] => Some(([low, high], true)),
-            [Some(low), None] => Some(([low.clone(), opposite(&low)], false)),
+            [Some(low), None] => {
+                let high = opposite(&low);
+                Some(([low, high], false))
+            }
             [None, Some(high)] => Some(([opposite(&high), high], false)),
             [None, None] => None,
         }

@@ -12,6 +12,7 @@ use std::collections::HashMap;
 
 use torqcomp_dsp::quality::clipping::Clipping;
 use torqcomp_dsp::quality::mains::MainsLine;
+use torqcomp_dsp::quality::repeats::repeats;
 
 use crate::recording::{AlignedChannels, Channel, TimeAxis};
 use crate::warning::Warning;
@@ -66,7 +67,8 @@ pub(crate) fn clipped(aligned: &AlignedChannels) -> Vec<Warning> {
 /// Warnings about values that are held, of channels sampled together.
 pub(crate) fn repeated(aligned: &AlignedChannels) -> Vec<Warning> {
     let axis = TimeAxis::uniform(aligned.rate_hz, aligned.start);
-    let of_channel = |channel: &Channel| repeats_of(&channel.name, &channel.samples, &axis);
+    let of_channel =
+        |channel: &Channel| repeats_of(&channel.name, &repeats(&channel.samples)?, &axis);
     aligned.channels.iter().filter_map(of_channel).collect()
 }
 

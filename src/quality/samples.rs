@@ -133,11 +133,7 @@ impl Findings {
         found.extend(clipping.flat_map(|c| clipped_ends(name, unit, c, axis)));
         found.extend(self.standstills.map(|s| stuck(name, unit, &s, axis)));
         found.extend(self.spikes.map(|s| spiked(name, unit, &s, axis)));
-        found.extend(
-            self.repeats
-                .filter(|r| r.unexplained == Some(true))
-                .map(|r| repeated(name, &r, axis)),
-        );
+        found.extend(self.repeats.and_then(|r| repeats_of(name, &r, axis)));
         // Lines that may be shaft orders are listed, but cause no warning.
         let hum_of = self.mains.as_ref().filter(|mains| mains.shaft_hz.is_none());
         found.extend(hum_of.map(|mains| hum(name, unit, mains)));
@@ -254,9 +250,8 @@ fn spiked(name: &str, unit: &str, found: &Spikes, axis: &TimeAxis) -> Warning {
 }
 
 /// Warning about samples that repeat more often than the resolution explains.
-pub fn repeats_of(name: &str, samples: &[f64], axis: &TimeAxis) -> Option<Warning> {
-    let found = repeats(samples).filter(|r| r.unexplained == Some(true));
-    found.map(|found| repeated(name, &found, axis))
+pub fn repeats_of(name: &str, found: &Repeats, axis: &TimeAxis) -> Option<Warning> {
+    (found.unexplained == Some(true)).then(|| repeated(name, found, axis))
 }
 
 fn repeated(name: &str, found: &Repeats, axis: &TimeAxis) -> Warning {

@@ -61,6 +61,13 @@ impl Coverage {
         self.all += 1;
     }
 
+    /// For few values, of which all may be inside.
+    fn at_least(&self, least: usize, what: &str) {
+        let Self { inside, all } = self;
+        println!("{what}: {inside} of {all}");
+        assert!(*inside >= least, "{what}: {inside} of {all}");
+    }
+
     fn check(&self, what: &str) {
         let share = self.inside as f64 / self.all as f64;
         println!("{what}: {} of {}", self.inside, self.all);

@@ -514,7 +514,7 @@ fn readings_that_never_settle_give_the_settled_sensitivity() {
             assert!(!codes.contains(&"not-linear"), "{codes:?}");
         }
         // More than 95 %, as the rows of eleven loads determine one time constant.
-        assert!(coverage.inside >= 92, "{} of 100", coverage.inside);
+        coverage.at_least(92, "sensitivities");
     }
 }
 
@@ -612,12 +612,6 @@ fn noise_of_a_measured_load_does_not_bias_the_sensitivity() {
             );
             coverage.count(of(&found, "sensitivity"), 0.1);
         }
-        println!("{cell}: {} of {}", coverage.inside, coverage.all);
-        assert!(
-            coverage.inside >= 92,
-            "{cell}: {} of {}",
-            coverage.inside,
-            coverage.all
-        );
+        coverage.at_least(92, &format!("noise of {cell} N m"));
     }
 }

@@ -139,7 +139,8 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
     let clipped = Clipping::of(&chosen.samples)
         .map(|found| quality::clipped_ends(&chosen.name, &unit, &found, &chosen.axis));
     let clipped = clipped.unwrap_or_default();
-    let held = quality::repeats_of(&chosen.name, &chosen.samples, &chosen.axis);
+    let repeats = repeats(&chosen.samples);
+    let held = repeats.and_then(|found| quality::repeats_of(&chosen.name, &found, &chosen.axis));
     let jitter = jitter(chosen, &args.reading);
     let jitters = !jitter.is_empty();
     let warnings = [
@@ -154,7 +155,9 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
     // Frees the other channels before the fit.
     let channel = recording.channels.swap_remove(place);
     drop(recording);
-    let (times_s, values, rate_hz) = new_values(ringing(channel, clock, rate_hz.is_some()));
+    let record = ringing(channel, clock, rate_hz.is_some());
+    let hold = repeats.and_then(|found| found.hold);
+    let (times_s, values, rate_hz) = new_values(record, hold);
     recorded.add(input, values.len(), rate_hz.map(|hz| (hz, rate_std_hz)));
     Ok(Loaded {
         name: input.shown().to_string(),
@@ -171,9 +174,8 @@ type Uniform = (Vec<f64>, Vec<f64>, Option<f64>);
 
 /// The samples that are new, where every value is held for the same number of samples: the images of the staircase look
 /// like modes.
-fn new_values((times_s, values, rate_hz): Uniform) -> Uniform {
-    let hold = rate_hz.and_then(|_| repeats(&values)?.hold);
-    let Some(hold) = hold else {
+fn new_values((times_s, values, rate_hz): Uniform, hold: Option<usize>) -> Uniform {
+    let (Some(of_record_hz), Some(hold)) = (rate_hz, hold) else {
         return (times_s, values, rate_hz);
     };
     let mut changes = vec![0_usize; hold];
@@ -182,11 +184,8 @@ fn new_values((times_s, values, rate_hz): Uniform) -> Uniform {
     }
     let first = (0..hold).max_by_key(|phase| changes[*phase]).unwrap_or(0);
     let of_new = |all: &[f64]| all.iter().skip(first).step_by(hold).copied().collect();
-    (
-        of_new(&times_s),
-        of_new(&values),
-        rate_hz.map(|hz| hz / hold as f64),
-    )
+    let of_new_hz = of_record_hz / hold as f64;
+    (of_new(&times_s), of_new(&values), Some(of_new_hz))
 }
 
 /// Times and samples of a channel with a start time and rate, and the rate if the times are uniform; a given rate

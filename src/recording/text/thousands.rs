@@ -32,15 +32,18 @@ pub(super) fn refuse(head: &Head, table: &Table, others: &[&Table]) -> Result<()
     let Some((place, name)) = found else {
         return Ok(());
     };
-    let shown: String = head.lines[place].text.trim().chars().take(60).collect();
-    Err(Failure::failed(
-        ErrorCode::TextUnclear,
-        format_args!(
+    Err(unclear(head, place, |shown| {
+        format!(
             "the {name} in \"{shown}\" can be a decimal mark or stand between thousands; say which with --decimal , or \
              --decimal ."
-        ),
-    )
-    .line(head.number(place)))
+        )
+    }))
+}
+
+/// The error that a line can be read in two ways.
+fn unclear(head: &Head, place: usize, why: impl Fn(&str) -> String) -> Failure {
+    let shown: String = head.lines[place].text.trim().chars().take(60).collect();
+    Failure::failed(ErrorCode::TextUnclear, why(&shown)).line(head.number(place))
 }
 
 /// Rejects a table with a column in which every number has the mark that is not the decimal mark of the others, before
@@ -59,17 +62,14 @@ pub(super) fn refuse_mixed(head: &Head, table: &Table) -> Result<(), Failure> {
         b',' => ("point", "comma"),
         _ => ("comma", "point"),
     };
-    let shown: String = head.lines[place].text.trim().chars().take(60).collect();
-    Err(Failure::failed(
-        ErrorCode::TextUnclear,
-        format_args!(
+    Err(unclear(head, place, |shown| {
+        format!(
             "the {mark} in \"{shown}\" stands before three digits in every row of its column, while others have a \
              decimal {decimal}: it can be a decimal mark or stand between thousands. If it stands between thousands, \
              say so with --decimal {}; otherwise write the same decimal mark in all columns",
             char::from(table.dialect.decimal)
-        ),
-    )
-    .line(head.number(place)))
+        )
+    }))
 }
 
 /// Location of the first number of a column whose points look like thousands separators: each is followed by three
