@@ -117,10 +117,12 @@ pub fn fit(
                 free = structure.model(&found.values).0.free_mode();
             }
         }
+        // The derivatives with respect to the initial states are those at the start of the fit.
+        let mut slopes_move = integrates;
         for _ in 0..MOST_STARTS {
             let starts_move =
                 integrates && correct_starts(&structure, &found.values, &mut records, &free);
-            if !starts_move && !modes_move {
+            if !starts_move && !modes_move && !std::mem::take(&mut slopes_move) {
                 break;
             }
             let values = &found.values[..start.len()];

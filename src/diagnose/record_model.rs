@@ -79,6 +79,19 @@ impl RecordModel {
         Some((residual, StateSlopes { motion, preload }))
     }
 
+    /// Derivatives of a record with respect to its initial displacement and speed, if the motion is integrated: far from
+    /// those of the linear stand where an effect changes its frequency.
+    pub fn slopes_of_motion(&self, record: &StandRecord) -> Option<StateSlopes> {
+        if !(self.chain.is_integrated() && record.has_free_motion(&self.free)) {
+            return None;
+        }
+        let (_, slopes) = self.residual_and_slopes(record)?;
+        Some(StateSlopes {
+            preload: None,
+            ..slopes
+        })
+    }
+
     /// The residual of a record with its present initial state; `None` if the motion diverges.
     pub fn residual(&self, record: StandRecord) -> Option<RecordResidual> {
         let (mut samples, slopes) = match self.chain.is_integrated() {

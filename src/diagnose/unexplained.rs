@@ -5,6 +5,7 @@ use torqcomp_model::{Chain, Mode, StandRun};
 
 use super::own_of_records::OwnOfRecords;
 use super::record::{Nuisance, NuisanceTerms, StandRecord};
+use super::record_model::RecordModel;
 use super::several_modes::{ModeSlopes, SeveralModes};
 use super::structure::Structure;
 
@@ -36,8 +37,12 @@ impl<'a> Unexplained<'a> {
         // Except for lines, drift and decays, the nuisance terms depend on the parameters through their mode
         // alone.
         problem.fixed = free.map(|free| {
-            let terms = structure.model(start).1.lasting();
-            let of = |(k, r): (usize, &StandRecord)| problem.nuisance(k, r, free, &terms);
+            let model = RecordModel::of(structure, start, *free);
+            let terms = model.terms.clone().lasting();
+            let of = |(k, record): (usize, &StandRecord)| match of_records.is_ringing(k) {
+                true => record.nuisance_beside_motion(&terms),
+                false => record.nuisance(free, &terms, model.slopes_of_motion(record)),
+            };
             records.iter().enumerate().map(of).collect()
         });
         let fixed = problem.fixed.as_deref().unwrap_or_default();
