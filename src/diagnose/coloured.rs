@@ -54,8 +54,8 @@ fn coloured_covariance(
     let fitted: &FittedModel = &model.fitted;
     let (_, terms) = fitted.structure.model(&fitted.values);
     let training = fitted.with_initial_states(&records.train);
-    let each = training.iter().map(|record| {
-        let nuisance = fitted.nuisance_under_load(record, &terms);
+    let each = training.iter().enumerate().map(|(k, record)| {
+        let nuisance = fitted.nuisance_of_training(k, &training);
         derivatives(fitted, record, &terms, &nuisance)
     });
     let each: Vec<Vec<Vec<f64>>> = each.collect::<Option<_>>()?;

@@ -105,30 +105,28 @@ pub fn fit(
         free = structure.model(&found.values).0.free_mode();
     }
     if effort.corrects_start && !rings {
-        if !integrates && moves_on(&structure, &found.values, &records, &free) {
-            // If the free motion of a plain stand's record decays before its end, the mode found is accurate enough for
-            // it.
-            let follows = !structure.effects.is_empty() || lasts(&records, &free);
-            free = structure.model(&found.values).0.free_mode();
-            let values = &found.values[..start.len()];
-            let fixed = (!follows).then_some(&free);
-            (found, modes_move) = minimize(&mut structure, values, &mut records, fixed, effort)?;
-            if follows {
-                free = structure.model(&found.values).0.free_mode();
-            }
-        }
         // The derivatives with respect to the initial states are those at the start of the fit.
         let mut slopes_move = integrates;
         for _ in 0..MOST_STARTS {
+            let free_moves = !integrates && moves_on(&structure, &found.values, &records, &free);
             let starts_move =
                 integrates && correct_starts(&structure, &found.values, &mut records, &free);
-            if !starts_move && !modes_move && !std::mem::take(&mut slopes_move) {
+            if !(free_moves || starts_move || modes_move || std::mem::take(&mut slopes_move)) {
                 break;
             }
+            // If the free motion of a plain stand's record decays before its end, the mode found is accurate enough for
+            // it.
+            let follows = free_moves && (!structure.effects.is_empty() || lasts(&records, &free));
+            if free_moves {
+                free = structure.model(&found.values).0.free_mode();
+            }
             let values = &found.values[..start.len()];
+            let fixed = (!follows).then_some(&free);
             let next;
-            (next, modes_move) =
-                minimize(&mut structure, values, &mut records, Some(&free), effort)?;
+            (next, modes_move) = minimize(&mut structure, values, &mut records, fixed, effort)?;
+            if follows {
+                free = structure.model(&next.values).0.free_mode();
+            }
             let has_settled = next.sum_of_squares > (1.0 - START_SETTLED) * found.sum_of_squares;
             found = next;
             if has_settled {
@@ -387,28 +385,34 @@ impl FittedModel {
 
     /// Nuisance terms of a record. The initial state of an integrated free decay is part of the model instead.
     pub fn nuisance(&self, record: &StandRecord, terms: &NuisanceTerms) -> Nuisance {
-        let rings = record.is_free() && self.integrates();
-        let slopes = rings.then(|| self.state_slopes(record)).flatten();
-        record.nuisance(&self.free, terms, slopes)
-    }
-
-    /// The same with the displacement under an unknown constant load, if the model depends on it.
-    pub fn nuisance_under_load(&self, record: &StandRecord, terms: &NuisanceTerms) -> Nuisance {
-        let (model, _) = self.structure.model(&self.values);
-        if !model.has_zero() {
-            return self.nuisance(record, terms);
-        }
-        let rings = record.is_free() && self.integrates();
         let slopes = self.state_slopes(record).map(|slopes| StateSlopes {
-            motion: slopes.motion.filter(|_| rings),
+            preload: slopes.preload.filter(|_| record.is_free()),
             ..slopes
         });
         record.nuisance(&self.free, terms, slopes)
     }
 
+    /// The same with the displacement under an unknown constant load, if the model depends on it.
+    pub fn nuisance_under_load(&self, record: &StandRecord, terms: &NuisanceTerms) -> Nuisance {
+        record.nuisance(&self.free, terms, self.state_slopes(record))
+    }
+
+    /// The same for training record `k`, whose load may be part of the model's parameters instead.
+    pub fn nuisance_of_training(&self, k: usize, records: &[StandRecord]) -> Nuisance {
+        let (model, terms) = self.structure.model(&self.values);
+        match OwnOfRecords::preloaded(&model, records.len()).contains(&k) {
+            true => self.nuisance_under_load(&records[k], &terms),
+            false => self.nuisance(&records[k], &terms),
+        }
+    }
+
     fn state_slopes(&self, record: &StandRecord) -> Option<StateSlopes> {
         let model = RecordModel::of(&self.structure, &self.values, self.free);
-        Some(model.residual_and_slopes(record)?.1)
+        let slopes = model
+            .chain
+            .is_integrated()
+            .then(|| model.residual_and_slopes(record));
+        Some(slopes??.1)
     }
 
     /// Residual of the fitted model on a record, with only the record's own constants, initial state and phases

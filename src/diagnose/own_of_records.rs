@@ -1,6 +1,9 @@
 //! Fit parameters that belong to a record rather than the stand.
 
+use std::ops::Range;
+
 use torqcomp_model::Chain;
+use torqcomp_model::effects::Zero;
 use torqcomp_model::fit::Parameter;
 use torqcomp_model::simulate::MotionState;
 
@@ -13,7 +16,8 @@ pub struct OwnOfRecords {
     size: f64,
     /// Frequency that converts a speed to a displacement.
     omega_rad_s: f64,
-    has_preload: bool,
+    /// Indices of the records whose displacement under a constant load is a parameter.
+    preloaded: Range<usize>,
     /// Indices of the free-decay records.
     ringing: Vec<usize>,
 }
@@ -30,8 +34,18 @@ impl OwnOfRecords {
         Self {
             size,
             omega_rad_s: model.free_mode().omega_rad_s,
-            has_preload: model.has_zero(),
+            preloaded: Self::preloaded(model, records.len()),
             ringing: (0..records.len()).filter(rings).collect(),
+        }
+    }
+
+    /// Records whose displacement under a constant load is a parameter: all, or all but the first if its places are
+    /// parameters of the model.
+    pub fn preloaded(model: &Chain, records: usize) -> Range<usize> {
+        match model.zero() {
+            Zero::Any => 0..0,
+            Zero::Fixed => 0..records,
+            Zero::Placed => 1..records,
         }
     }
 
@@ -44,7 +58,7 @@ impl OwnOfRecords {
     pub fn parameters(&self, records: &[StandRecord]) -> Vec<Parameter> {
         let limit = Self::LARGEST_PRELOAD;
         let preload = |r: &StandRecord| within(r.initial.preload / self.size, [-limit, limit], 0.1);
-        let preloads = records.iter().filter(|_| self.has_preload).map(preload);
+        let preloads = records[self.preloaded.clone()].iter().map(preload);
         let states = self.ringing.iter().flat_map(|k| {
             let motion = records[*k].initial.motion;
             [motion.x, motion.speed / self.omega_rad_s].map(|x| {
@@ -61,12 +75,9 @@ impl OwnOfRecords {
     /// Record `k` with values of these parameters.
     pub fn set(&self, k: usize, record: &StandRecord, values: &[f64]) -> StandRecord {
         let mut record = record.clone();
-        let preloads = match self.has_preload {
-            true => values.len() - 2 * self.ringing.len(),
-            false => 0,
-        };
-        if let Some(preload) = values[..preloads].get(k) {
-            record.initial.preload = preload * self.size;
+        let preloads = self.preloaded.len();
+        if self.preloaded.contains(&k) {
+            record.initial.preload = values[k - self.preloaded.start] * self.size;
         }
         if let Some(place) = self.ringing.iter().position(|ringing| *ringing == k) {
             let state = &values[preloads + 2 * place..];

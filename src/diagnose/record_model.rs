@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use nalgebra::DMatrix;
+use torqcomp_model::effects::Zero;
 use torqcomp_model::fit::linear::solve;
 use torqcomp_model::simulate::MotionState;
 use torqcomp_model::{Chain, Mode, StandRun};
@@ -46,6 +47,7 @@ impl RecordModel {
     pub fn residual_and_slopes(&self, record: &StandRecord) -> Option<(Vec<f64>, StateSlopes)> {
         let step = STATE_STEP * self.rms;
         let moves = record.has_free_motion(&self.free);
+        let depends = self.chain.zero() != Zero::Any;
         let motions = [[step, 0.0], [0.0, step]].into_iter().filter(|_| moves);
         let moved = motions.map(|motion| {
             let mut initial = record.initial;
@@ -53,7 +55,7 @@ impl RecordModel {
             initial
         });
         let mut initial: Vec<InitialState> = std::iter::once(record.initial).chain(moved).collect();
-        if self.chain.has_zero() {
+        if depends {
             initial.push(InitialState {
                 preload: record.initial.preload + step,
                 ..record.initial
@@ -72,7 +74,7 @@ impl RecordModel {
             true => Some([slope()?, slope()?]),
             false => None,
         };
-        let preload = match self.chain.has_zero() {
+        let preload = match depends {
             true => Some(slope()?),
             false => None,
         };

@@ -11,6 +11,7 @@ use super::blocks::{Comparison, compare};
 use super::columns::Columns;
 use super::fit::{FitEffort, FittedModel, RecordResidual};
 use super::model_residuals::ModelResiduals;
+use super::own_of_records::OwnOfRecords;
 use super::record::{Nuisance, NuisanceTerms, StandRecord};
 use super::records::Records;
 use super::several_modes::slopes_of_modes;
@@ -200,10 +201,12 @@ impl ScoredModel {
         self.used_for_comparison().count()
     }
 
-    /// Number of parameters, including amplitudes of lines and their phases on each training record.
+    /// Number of parameters, including amplitudes of lines, and their phases and the constant load on each training
+    /// record.
     pub fn parameter_count(&self) -> usize {
-        let (_, terms) = self.fitted.structure.model(&self.fitted.values);
+        let (model, terms) = self.fitted.structure.model(&self.fitted.values);
         self.fitted.values.len()
+            + OwnOfRecords::preloaded(&model, self.train.records().len()).len()
             + self.fitted.amplitudes.len()
             + terms.lines_hz.len() * self.train.records().len()
             + self.parameters_of_spikes()

@@ -6,7 +6,7 @@ use std::ops::Range;
 use num_complex::Complex64;
 
 use super::{Chain, Link};
-use crate::effects::{Action, SampleClock, Stage};
+use crate::effects::{Action, SampleClock, Stage, Zero};
 use crate::mode::Mode;
 use crate::simulate::{
     Between, Excitation, MotionProgress, MotionState, OngoingMotion, Torques, free_motion,
@@ -222,10 +222,17 @@ impl Chain {
             .sum()
     }
 
-    /// Whether a constant load changes more than the offset of the record.
+    /// How its torques depend on the zero of displacement.
     #[must_use]
-    pub fn has_zero(&self) -> bool {
-        self.torques().iter().any(|(torque, _)| torque.has_zero())
+    pub fn zero(&self) -> Zero {
+        let zeros = self.torques().into_iter().map(|(torque, _)| torque.zero());
+        let mut depends = zeros.filter(|zero| *zero != Zero::Any);
+        match (depends.next(), depends.next()) {
+            (None, _) => Zero::Any,
+            (Some(only), None) => only,
+            // The places of two torques relative to each other do not depend on a constant load.
+            (Some(_), Some(_)) => Zero::Fixed,
+        }
     }
 
     /// Initial state of a motion.

@@ -35,6 +35,17 @@ impl SampleClock {
     }
 }
 
+/// How a torque depends on the zero of displacement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Zero {
+    /// Not at all.
+    Any,
+    /// A constant load changes it.
+    Fixed,
+    /// A constant load changes it as its places do: a record does not tell one from the other.
+    Placed,
+}
+
 /// What an effect does.
 pub enum Action {
     /// A torque in the stand; in the gage's load path, the gage shows it together with `x`.
@@ -174,9 +185,9 @@ pub trait Torque: Send + Sync {
         false
     }
 
-    /// Whether the torque depends on the zero of displacement, so that a constant load matters.
-    fn has_zero(&self) -> bool {
-        false
+    /// How it depends on the zero of displacement.
+    fn zero(&self) -> Zero {
+        Zero::Any
     }
 
     /// Initial memory.

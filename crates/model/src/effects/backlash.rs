@@ -11,7 +11,7 @@
 
 use super::{
     Action, Distortion, Effect, EffectParameter, Form, Memory, SampleClock, Stage, Torque,
-    Unrecovered,
+    Unrecovered, Zero,
 };
 
 const GAP: EffectParameter = EffectParameter::motion("gap", 1, 0, 0.0, 3.0);
@@ -106,8 +106,8 @@ impl Torque for Gap {
         if self.share < 1.0 { 0.0 } else { self.gap }
     }
 
-    fn has_zero(&self) -> bool {
-        true
+    fn zero(&self) -> Zero {
+        Zero::Fixed
     }
 }
 

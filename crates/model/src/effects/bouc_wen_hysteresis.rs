@@ -7,7 +7,7 @@
 //! **Valid without drift of the loops**; does not close small inner loops as metals do. Mistaken for `coulomb-friction`
 //! (its limit for a stiff joint), `structural-damping` at one level.
 //!
-//! The law is rate-independent: `z` follows the steps of `x`, by the midpoint rule.
+//! The law is rate-independent: `z` follows the steps of `x`, to second order.
 
 use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
 
@@ -108,28 +108,36 @@ impl BoucWen {
         }
     }
 
-    /// `dz/dx` for a step of that sign.
-    fn slope(&self, z: f64, step: f64) -> f64 {
-        let size = z.abs();
+    /// `f = dz/dx = 1 − |s z|^m g/s` for a step of that sign, with `g = b sgn(x' z) + c`, and
+    /// `df/dz = −m |s z|^(m−1) g sgn z`.
+    fn slope(&self, z: f64, step: f64) -> [f64; 2] {
         let sum = self.loss.copysign(step * z) + self.shape;
-        if self.exponent == 1.0 {
-            return 1.0 - size * sum;
-        }
         // A common scale of z for loss and shape keeps the two comparable for any exponent.
-        let scale = self.loss + self.shape.abs();
-        if scale == 0.0 {
-            return 1.0;
+        let power = match self.exponent == 1.0 {
+            true => 1.0,
+            false => (z.abs() * (self.loss + self.shape.abs())).powf(self.exponent - 1.0),
+        };
+        let bend = power * sum;
+        [1.0 - bend * z.abs(), -self.exponent * bend * z.signum()]
+    }
+
+    /// `z` after a step of `x`, to second order: by its Taylor series, or by the midpoint rule if it changes its sign,
+    /// where `f` has a bend.
+    fn after(&self, z: f64, step: f64) -> f64 {
+        let [slope, change] = self.slope(z, step);
+        let next = z + step * slope * (1.0 + 0.5 * step * change);
+        if next * z > 0.0 {
+            return next;
         }
-        1.0 - (size * scale).powf(self.exponent) * sum / scale
+        let middle = z + 0.5 * step * slope;
+        z + step * self.slope(middle, step)[0]
     }
 }
 
 impl Torque for BoucWen {
     fn value(&self, memory: &mut Memory, x: f64, _: f64) -> f64 {
         let [z, last] = *memory;
-        let step = x - last;
-        let middle = z + 0.5 * step * self.slope(z, step);
-        *memory = [z + step * self.slope(middle, step), x];
+        *memory = [self.after(z, x - last), x];
         self.ratio * memory[0]
     }
 

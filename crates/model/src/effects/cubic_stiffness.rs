@@ -6,7 +6,7 @@
 //! which sets in at one displacement, is not cubic. Mistaken for `gage-nonlinearity` of the same power, which
 //! distorts the record and not the motion, at low level for `quadratic-stiffness`.
 
-use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
+use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque, Zero};
 
 const COEFFICIENT: &[EffectParameter] =
     &[EffectParameter::motion("coefficient", -2, 0, -0.2, 100.0)];
@@ -51,7 +51,7 @@ impl Torque for Cubic {
         self.coefficient * x * x * x
     }
 
-    fn has_zero(&self) -> bool {
-        true
+    fn zero(&self) -> Zero {
+        Zero::Fixed
     }
 }

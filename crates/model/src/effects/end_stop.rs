@@ -6,7 +6,7 @@
 //!
 //! Integration: for constant `x` in contact, the speed follows `x'' = −ω₀² (k (x − g) + c x')` exactly.
 
-use super::{Action, Effect, EffectParameter, Form, Memory, ParameterScale, Stage, Torque};
+use super::{Action, Effect, EffectParameter, Form, Memory, ParameterScale, Stage, Torque, Zero};
 
 const GAP: EffectParameter =
     EffectParameter::motion("gap", 1, 0, 0.05, 2.0).by(ParameterScale::Peak);
@@ -98,6 +98,7 @@ pub(super) static EFFECT: Effect = Effect {
             build: |p| {
                 Action::beside(Stop {
                     upper: p[3],
+                    is_centred: false,
                     ..Stop::both(p)
                 })
             },
@@ -110,6 +111,8 @@ struct Stop {
     damping: f64,
     lower: f64,
     upper: f64,
+    /// Whether the two stops are as far from the zero of displacement.
+    is_centred: bool,
 }
 
 impl Stop {
@@ -119,12 +122,14 @@ impl Stop {
             damping: p.get(2).copied().unwrap_or(0.0),
             lower: -p[1],
             upper: p[1],
+            is_centred: true,
         }
     }
 
     fn above(p: &[f64]) -> Self {
         Self {
             lower: f64::NEG_INFINITY,
+            is_centred: false,
             ..Self::both(p)
         }
     }
@@ -132,6 +137,7 @@ impl Stop {
     fn below(p: &[f64]) -> Self {
         Self {
             upper: f64::INFINITY,
+            is_centred: false,
             ..Self::both(p)
         }
     }
@@ -160,7 +166,10 @@ impl Torque for Stop {
         towards + (speed - towards) * (-loss).exp()
     }
 
-    fn has_zero(&self) -> bool {
-        true
+    fn zero(&self) -> Zero {
+        match self.is_centred {
+            true => Zero::Fixed,
+            false => Zero::Placed,
+        }
     }
 }

@@ -48,7 +48,7 @@ mod time_delay;
 pub use crate::mode::Mode;
 pub use action::{
     Action, Distortion, Fixed, Frequency, Memory, SampleClock, StiffnessChange, Torque, Treatment,
-    Unrecovered,
+    Unrecovered, Zero,
 };
 pub(crate) use backlash::bridge;
 pub use capacitive_coupling::level;

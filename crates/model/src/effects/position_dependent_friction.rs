@@ -9,7 +9,7 @@
 //! [`coulomb_friction`](super::coulomb_friction).
 
 use super::coulomb_friction::Friction;
-use super::{Action, Effect, EffectParameter, Form, Memory, ParameterScale, Stage, Torque};
+use super::{Action, Effect, EffectParameter, Form, Memory, ParameterScale, Stage, Torque, Zero};
 
 const CENTRE: EffectParameter =
     EffectParameter::motion("centre", 1, 0, -1.0, 1.0).by(ParameterScale::Peak);
@@ -110,7 +110,7 @@ impl<F: Fn(f64) -> f64 + Send + Sync> Torque for Local<F> {
         true
     }
 
-    fn has_zero(&self) -> bool {
-        true
+    fn zero(&self) -> Zero {
+        Zero::Placed
     }
 }

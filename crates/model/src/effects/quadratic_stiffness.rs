@@ -5,7 +5,7 @@
 //! `2 c x = −1` the even form loses all stiffness. Mistaken for `gage-nonlinearity` (even) and
 //! `cubic-stiffness` (odd).
 
-use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
+use super::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque, Zero};
 
 pub(super) static EFFECT: Effect = Effect {
     name: "quadratic-stiffness",
@@ -62,8 +62,8 @@ impl Torque for Even {
         self.coefficient * x * x
     }
 
-    fn has_zero(&self) -> bool {
-        true
+    fn zero(&self) -> Zero {
+        Zero::Fixed
     }
 }
 
@@ -76,7 +76,7 @@ impl Torque for Odd {
         self.coefficient * x * x.abs()
     }
 
-    fn has_zero(&self) -> bool {
-        true
+    fn zero(&self) -> Zero {
+        Zero::Fixed
     }
 }

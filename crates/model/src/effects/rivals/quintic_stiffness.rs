@@ -3,7 +3,7 @@
 //! `n = c x⁵`. I. Kovacic, M. J. Brennan (eds.), *The Duffing Equation* (2011), 1. **Valid where the cubic part is
 //! small.** Mistaken for `cubic-stiffness` and, owing to its four parameters, `bouc-wen-hysteresis`.
 
-use crate::effects::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
+use crate::effects::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque, Zero};
 
 const COEFFICIENT: &[EffectParameter] =
     &[EffectParameter::motion("coefficient", -4, 0, -0.02, 100.0)];
@@ -48,7 +48,7 @@ impl Torque for Quintic {
         self.coefficient * x.powi(5)
     }
 
-    fn has_zero(&self) -> bool {
-        true
+    fn zero(&self) -> Zero {
+        Zero::Fixed
     }
 }

@@ -5,7 +5,7 @@
 //!
 //! Integration: for constant `x`, `x' = v e^{−ω₀² d x² t}` exactly.
 
-use crate::effects::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque};
+use crate::effects::{Action, Effect, EffectParameter, Form, Memory, Stage, Torque, Zero};
 
 pub(super) static EFFECT: Effect = Effect {
     name: "squeezed-damping",
@@ -39,7 +39,7 @@ impl Torque for Squeezed {
         speed * (-impulse * self.coefficient * x * x).exp()
     }
 
-    fn has_zero(&self) -> bool {
-        true
+    fn zero(&self) -> Zero {
+        Zero::Fixed
     }
 }
