@@ -17,6 +17,18 @@ pub struct NamedUnit {
 pub(crate) const OF_FULL_SCALE: &str = "of full scale";
 
 impl NamedUnit {
+    /// Factor from values in a unit to values in another; `None` if only one of them is known, or they are of different
+    /// kinds.
+    pub(crate) fn factor_between(from: Option<&Self>, to: Option<&Self>) -> Option<f64> {
+        match [from, to].map(|unit| unit.map(|named| named.unit)) {
+            [None, None] => Some(1.0),
+            [Some(from), Some(to)] if from.dimension() == to.dimension() => {
+                Some(from.factor() / to.factor())
+            }
+            _ => None,
+        }
+    }
+
     /// Reads a unit as recorders write it, without words in brackets after it
     /// (`Voltage (unscaled)` names no unit).
     #[must_use]

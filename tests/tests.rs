@@ -28,6 +28,7 @@ mod free_body;
 mod golden;
 mod harmonics;
 mod identify;
+mod in_motion;
 mod inspect;
 mod known_loads;
 mod mcap_file;

@@ -106,7 +106,8 @@ pub fn fit(
     }
     if effort.corrects_start && !rings {
         // The derivatives with respect to the initial states are those at the start of the fit.
-        let mut slopes_move = integrates;
+        let falls = found.sum_of_squares < (1.0 - START_SETTLED) * found.sum_at_start;
+        let mut slopes_move = integrates && falls;
         for _ in 0..MOST_STARTS {
             let free_moves = !integrates && moves_on(&structure, &found.values, &records, &free);
             let starts_move =

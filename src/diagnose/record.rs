@@ -89,6 +89,7 @@ impl NuisanceTerms {
 }
 
 /// Derivatives of a record, over its range, with respect to its initial state.
+#[derive(Default)]
 pub struct StateSlopes {
     /// With respect to displacement, and to speed over `ω₀`, at the first sample; `None` if the free motion has
     /// decayed.
@@ -265,18 +266,18 @@ impl StandRecord {
         terms: &NuisanceTerms,
         slopes: Option<StateSlopes>,
     ) -> Nuisance {
+        let StateSlopes { motion, preload } = slopes.unwrap_or_default();
         let mut nuisance = Nuisance::default();
         let columns = &mut nuisance.columns;
         columns.push(self.weighted(vec![1.0; self.count()]));
         if self.has_free_motion(mode) {
             nuisance.motion = Some(1);
             nuisance.sees_start = self.sees_start(mode);
-            let slopes = slopes.as_ref().and_then(|slopes| slopes.motion.clone());
-            for column in slopes.unwrap_or_else(|| self.free_motion(mode)) {
+            for column in motion.unwrap_or_else(|| self.free_motion(mode)) {
                 columns.push(column);
             }
         }
-        if let Some(column) = slopes.and_then(|slopes| slopes.preload) {
+        if let Some(column) = preload {
             nuisance.preload = Some(columns.count());
             columns.push(column);
         }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use torqcomp_model::effects::Unit;
 use torqcomp_model::{Chain, Estimate, StandRun};
 
 use super::blocks::{Comparison, compare};
@@ -53,6 +54,9 @@ pub struct RmsErrors {
 
 /// Minimum distance of a parameter from zero, in standard uncertainties.
 const SIGNIFICANT: f64 = 3.0;
+/// Ratio to another parameter in the same unit below which it is negligible: without hysteresis, the law of Bouc and Wen
+/// is that of a spring.
+const NEGLIGIBLE: f64 = 0.01;
 /// A refit with a finer integration step or another waveform of the input.
 const REPEATED_FIT: FitEffort = FitEffort::full(6);
 /// Change of a record with half the integration step, relative to the RMS residual, above which the step is halved.
@@ -229,12 +233,17 @@ impl ScoredModel {
         let fitted = &self.fitted;
         let last = fitted.structure.effects.last()?;
         let first = fitted.values.len() - last.moved();
+        let own = || last.form.parameters.iter().take(last.moved()).enumerate();
         let is_zero = |k: usize| {
+            let value = fitted.values[first + k];
             let std = fitted.std[first + k].unwrap_or(0.0);
-            fitted.values[first + k] <= SIGNIFICANT * std
+            let unit = last.form.parameters[k].unit;
+            let beside = own().filter(|(j, p)| *j != k && unit != Unit::Number && p.unit == unit);
+            let largest = beside.map(|(j, _)| fitted.values[first + j].abs());
+            value <= SIGNIFICANT * std || largest.fold(0.0, f64::max) * NEGLIGIBLE > value
         };
-        let own = last.form.parameters.iter().take(last.moved()).enumerate();
-        own.filter(|(_, p)| p.essential)
+        own()
+            .filter(|(_, p)| p.essential)
             .find(|(k, _)| is_zero(*k))
             .map(|(_, p)| p.name)
     }

@@ -4,6 +4,7 @@ pub mod decay;
 mod hum;
 mod mode;
 mod motion;
+mod overtone;
 mod present;
 pub mod response;
 pub mod runup;

@@ -11,6 +11,7 @@ use super::{Channel, Recording, Selection, TimeAxis, typical_step};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::{ChannelChoice, Input, Reading};
 use crate::print;
+use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
 /// Largest difference of the stamps of two channels that count as equal, in steps.
@@ -62,23 +63,17 @@ impl AlignedChannels {
     pub(crate) fn convert_to_units_of(&mut self, other: &Self) -> Result<(), Failure> {
         for (channel, other_channel) in self.channels.iter_mut().zip(&other.channels) {
             let units = [&channel.unit, &other_channel.unit];
-            let factor = match units.map(|unit| unit.as_ref().map(|unit| unit.unit)) {
-                [None, None] => continue,
-                [Some(unit), Some(other)] if unit.dimension() == other.dimension() => {
-                    unit.factor() / other.factor()
-                }
-                _ => {
-                    let [unit, other_unit] =
-                        units.map(|unit| unit.as_ref().map_or("no unit", |u| &u.text));
-                    return Err(Failure::failed(
-                        ErrorCode::RecordsDiffer,
-                        format_args!(
-                            "the channel \"{}\" has {unit} in {} and {other_unit} in {}; give its unit with \
-                             --applied-unit or --measured-unit, or take the records one by one",
-                            channel.name, self.source, other.source
-                        ),
-                    ));
-                }
+            let [from, to] = units.map(Option::as_ref);
+            let Some(factor) = NamedUnit::factor_between(from, to) else {
+                let [unit, other_unit] = [from, to].map(|unit| unit.map_or("no unit", |u| &u.text));
+                return Err(Failure::failed(
+                    ErrorCode::RecordsDiffer,
+                    format_args!(
+                        "the channel \"{}\" has {unit} in {} and {other_unit} in {}; give its unit with \
+                         --applied-unit or --measured-unit, or take the records one by one",
+                        channel.name, self.source, other.source
+                    ),
+                ));
             };
             if factor != 1.0 {
                 channel

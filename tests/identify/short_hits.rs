@@ -115,3 +115,63 @@ fn the_noise_of_the_force_of_several_hits_counts_once() {
         );
     }
 }
+
+/// Report of four hits of unequal force on a stand of 100 Hz; `recorder` makes a sample of the motion and its row.
+fn four_hits(
+    seed: u64,
+    recorder: impl Fn(&dyn Fn(usize) -> f64, usize) -> f64,
+) -> serde_json::Value {
+    let mut noise = Noise(seed);
+    let rows = [1.0, 0.62, 0.85, 0.47].into_iter().flat_map(|size| {
+        let rows = hit(100.0, 0.03, 0.003, 0.02).into_iter();
+        rows.map(move |(force, x)| (size * force, size * x))
+    });
+    let rows: Vec<(f64, f64)> = rows.collect();
+    let mut text = String::from("time_s,force [N m],bridge [V]\n");
+    for (row, (force, _)) in rows.iter().enumerate() {
+        let seen = recorder(&|row| rows[row].1, row);
+        let force = force + 1e-3 * noise.normal();
+        let _ = writeln!(text, "{:.4},{force:.6},{seen:.9}", row as f64 / RATE_HZ);
+    }
+    let folder = Folder::new();
+    folder.write("hits.csv", text);
+    let verb = ["identify", "response", "hits.csv", "--json"];
+    folder.json(&[&verb[..], &["--applied", "force", "--measured", "bridge"]].concat())
+}
+
+fn warned(report: &serde_json::Value) -> Vec<&str> {
+    let all = report["warnings"].as_array().expect("a list").iter();
+    all.filter_map(|w| w["code"].as_str()).collect()
+}
+
+/// An amplifier that saturates softly had made the static gain up to 34 % too small without a warning.
+#[test]
+fn distortion_by_hits_is_said() {
+    for seed in [1, 2] {
+        for (part, is_said) in [(0.0, false), (0.5, true), (1.0, true), (2.0, true)] {
+            let largest = 0.45;
+            let report = four_hits(seed, |x, row| match part {
+                0.0 => x(row),
+                part => largest / part * (part / largest * x(row)).tanh(),
+            });
+            let codes = warned(&report);
+            assert_eq!(codes.contains(&"overtone"), is_said, "{part}: {report}");
+        }
+    }
+}
+
+/// Steps of a converter and values that are held for several rows had been taken for a limit.
+#[test]
+fn coarse_and_held_hits_are_used() {
+    let held = four_hits(3, |x, row| x(row / 5 * 5));
+    let coarse = four_hits(4, |x, row| (x(row) * 40.0).round() / 40.0);
+    for report in [held, coarse] {
+        assert!(!warned(&report).contains(&"hit-left-out"), "{report}");
+        let all = report["parameters"].as_array().expect("parameters");
+        let frequency = all.iter().find(|p| p["name"] == "natural_frequency");
+        let hz = frequency.expect("one mode")["value"]
+            .as_f64()
+            .expect("a number");
+        assert!((hz - 100.0).abs() < 0.2, "{report}");
+    }
+}

@@ -182,10 +182,11 @@ fn all_pairs(args: &Diagnose) -> Result<[Vec<Pair>; 4], Failure> {
             pair.applied_unit.clone_from(&load.applied_unit);
         }
     }
-    let first = &train[0];
-    for other in train.iter().chain(&holdout) {
-        check_same_kind(first, other)?;
+    let (first, others) = train.split_first_mut().expect("a training record");
+    for other in others.iter_mut().chain(&mut holdout) {
+        make_alike(first, other)?;
     }
+    let first = &train[0];
     refuse_same_samples(&train, &holdout)?;
     loads::check_units(&loads, first)?;
     let running = running::pairs(args, first)?;
@@ -278,8 +279,8 @@ fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
     })
 }
 
-/// Rejects records at different rates or in different units.
-fn check_same_kind(first: &Pair, other: &Pair) -> Result<(), Failure> {
+/// Converts a record to the units of the first; rejects it if they are of different kinds, or its rate differs.
+fn make_alike(first: &Pair, other: &mut Pair) -> Result<(), Failure> {
     if (first.rate_hz / other.rate_hz - 1.0).abs() > 1e-4 {
         return Err(Failure::failed(
             ErrorCode::RecordsDiffer,
@@ -293,20 +294,34 @@ fn check_same_kind(first: &Pair, other: &Pair) -> Result<(), Failure> {
             ),
         ));
     }
-    let differ = |of: fn(&Pair) -> &Option<NamedUnit>| {
-        let [first, other] = [first, other].map(|p| of(p).as_ref().map(|u| u.unit.factor()));
-        first != other
-    };
-    let both_act = first.applied.is_some() && other.applied.is_some();
-    if both_act && differ(|p| &p.applied_unit) || differ(|p| &p.measured_unit) {
-        return Err(Failure::failed(
+    let differ = || {
+        Failure::failed(
             ErrorCode::RecordsDiffer,
             format_args!(
-                "{} and {} have their channels in different units; give --applied-unit and --measured-unit, or \
-                 convert one of them",
+                "{} and {} have their channels in units of different kinds, or only one of them says its units; choose \
+                 the channels of one kind, or write the units into its headings",
                 first.source, other.source
             ),
-        ));
+        )
+    };
+    let factor = |of: fn(&Pair) -> &Option<NamedUnit>| {
+        let [from, to] = [&*other, first].map(|pair| of(pair).as_ref());
+        NamedUnit::factor_between(from, to).ok_or_else(differ)
+    };
+    let of_measured = factor(|pair| &pair.measured_unit)?;
+    let of_applied = match first.applied.is_some() && other.applied.is_some() {
+        true => factor(|pair| &pair.applied_unit)?,
+        false => 1.0,
+    };
+    let applied = other.applied.iter_mut().flatten();
+    applied.for_each(|value| *value *= of_applied);
+    other
+        .measured
+        .iter_mut()
+        .for_each(|value| *value *= of_measured);
+    other.measured_unit.clone_from(&first.measured_unit);
+    if other.applied.is_some() && first.applied.is_some() {
+        other.applied_unit.clone_from(&first.applied_unit);
     }
     Ok(())
 }

@@ -18,7 +18,7 @@ mod stretches;
 mod turns;
 
 use super::hum::SteadyLine;
-use super::{FitQuality, Identification, ModalPole, hum, rms};
+use super::{FitQuality, Identification, ModalPole, hum, overtone, rms};
 use crate::failure::Failure;
 use crate::warning::Warning;
 
@@ -107,7 +107,7 @@ fn evaluated(
     dependence::amplitude_dependence(&mut result, &fit, &stretches, order[0]);
     present::apart(&mut result, &fit, stretches.len());
     present::crowded(&mut result, &fit, order[0]);
-    present::overtones(&mut result, &fit, order[0], stretches.len());
+    tell_overtones(&mut result, &fit, order[0], stretches.len());
     present::poor(&mut result, &fit, &stretches, (order[0], has_baseline));
     by_hand::compare(&mut result, &fit, &stretches, order[0]);
     present::draw(&mut result, &fit, &stretches);
@@ -208,4 +208,15 @@ fn quality(fit: &ModesFit, stretches: &[Stretch]) -> FitQuality {
         unit: String::new(),
         relative: fit.fit.rms / rms(&swing),
     }
+}
+
+/// Warns about modes that are distortion of the strongest.
+fn tell_overtones(result: &mut Identification, fit: &ModesFit, main: usize, stretches: usize) {
+    let share = |k: usize| {
+        let of = |s: usize| fit.amplitude(k, s) / fit.amplitude(main, s);
+        (0..stretches).map(of).fold(0.0, f64::max)
+    };
+    let shares: Vec<f64> = (0..fit.poles.len()).map(share).collect();
+    let advice = "hit more softly, or use a later part with --range";
+    overtone::warn(result, &fit.poles, main, &shares, advice);
 }

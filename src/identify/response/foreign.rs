@@ -12,7 +12,7 @@ use torqcomp_model::Covariance;
 use super::Modal;
 use super::blocks::Set;
 use crate::failure::{ErrorCode, Failure};
-use crate::identify::{Identification, Pole};
+use crate::identify::{Identification, Pole, overtone};
 use crate::print::rounded;
 
 /// Damping ratio above which a mode far below the others does not ring.
@@ -67,17 +67,21 @@ pub(super) fn mark(modal: &mut Modal, covariance: &Covariance, set: &Set) {
     }
 }
 
-fn kinds(modal: &Modal, covariance: &Covariance, set: &Set) -> Vec<Option<Foreign>> {
-    let highest_hz = set.step_hz * (set.lines - 1) as f64;
-    let strongest = (0..modal.poles.len()).max_by(|a, b| {
+/// The mode with the largest resonance; one that rings, if any does.
+pub(super) fn strongest(modal: &Modal) -> Option<usize> {
+    (0..modal.poles.len()).max_by(|a, b| {
         let size = |k: usize| modal.residue(k).0.norm() / modal.poles[k].rate_per_s.max(1e-12);
         let rings =
             |k: usize| modal.poles[k].rate_per_s < RINGS * TAU * natural_hz(&modal.poles[k]);
         (rings(*a), size(*a))
             .partial_cmp(&(rings(*b), size(*b)))
             .unwrap_or(std::cmp::Ordering::Equal)
-    });
-    let strongest_hz = strongest.map_or(0.0, |k| natural_hz(&modal.poles[k]));
+    })
+}
+
+fn kinds(modal: &Modal, covariance: &Covariance, set: &Set) -> Vec<Option<Foreign>> {
+    let highest_hz = set.step_hz * (set.lines - 1) as f64;
+    let strongest_hz = strongest(modal).map_or(0.0, |k| natural_hz(&modal.poles[k]));
     let one = |(k, pole): (usize, &Pole)| {
         let natural_hz = natural_hz(pole);
         let is_slow = natural_hz < FAR_BELOW * strongest_hz
@@ -164,6 +168,19 @@ pub(super) fn undamped(result: &mut Identification, frequencies_hz: &[String]) {
             ),
         );
     }
+}
+
+/// Warns about modes that are distortion of the strongest.
+pub(super) fn tell_overtones(result: &mut Identification, modal: &Modal) {
+    let Some(main) = strongest(modal) else {
+        return;
+    };
+    let size = |k: usize| modal.residue(k).0.norm();
+    let shares: Vec<f64> = (0..modal.poles.len())
+        .map(|k| size(k) / size(main))
+        .collect();
+    let advice = "excite the stand less, or set the amplifier to a wider range";
+    overtone::warn(result, &modal.poles, main, &shares, advice);
 }
 
 /// Note if no mode belongs to the stand.

@@ -157,6 +157,7 @@ fn evaluate(
         return Err(Failure::failed(ErrorCode::UnsuitableRecord, check::LEADS));
     }
     foreign::warn(&mut result, &fitted.modal, is_grounded)?;
+    foreign::tell_overtones(&mut result, &fitted.modal);
     present::add_modes(&mut result, &fitted);
     if is_grounded && result.modes.len() > 1 {
         result.shares = shares::of(&fitted, options.order);

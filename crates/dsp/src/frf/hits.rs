@@ -6,6 +6,8 @@ use std::ops::Range;
 use num_complex::Complex64;
 
 use crate::quality;
+use crate::quality::quantisation::quantisation;
+use crate::quality::repeats::repeats;
 
 /// A hit.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,6 +74,13 @@ const LEAST_STANDING: usize = 4;
 const ROUND: f64 = 6.0;
 /// Number of equal consecutive samples that means clipping.
 const FLAT: usize = 3;
+/// Smallest ratio of the samples at the extreme to those one step below it that is no round top, where it is at most
+/// `1/(√2 − 1)`.
+const NEXT: usize = 3;
+/// Samples by which the ratio is off, as both are whole numbers.
+const UNEVEN: usize = 2;
+/// Largest number of samples at the extreme of a round top that has none one step below.
+const MOST_BARE: usize = 4;
 /// Samples kept before the rise of the force.
 const BEFORE: usize = 16;
 
@@ -100,13 +109,20 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
     }
     let noise = spread(force, rest);
     let noises = [noise, noise_of(measured)];
+    let grains = [force, measured].map(Grain::of);
     let lengths = |k: usize| starts.get(k + 1).copied().unwrap_or(force.len()) - starts[k];
     let enough = common_length(&(0..starts.len()).map(lengths).collect::<Vec<_>>());
     let mut hits: Vec<Hit> = (0..peaks.len())
         .map(|k| {
             let range = starts[k]..starts[k] + lengths(k);
             let is_last = k + 1 == starts.len();
-            let mut faults = faults([force, measured], noises, rest, peaks[k], range.clone());
+            let mut faults = faults(
+                [force, measured],
+                (noises, grains),
+                rest,
+                peaks[k],
+                range.clone(),
+            );
             let second = (SECOND * size(peaks[k])).max(ABOVE_NOISE * noise);
             let second = second_stroke(&size, peaks[k], range.end, second);
             if range.len() < enough {
@@ -211,22 +227,46 @@ fn has_decayed(measured: &[f64]) -> bool {
 /// Clipped signals of a hit.
 fn faults(
     [force, measured]: [&[f64]; 2],
-    noises: [f64; 2],
+    (noises, grains): ([f64; 2], [Grain; 2]),
     rest: f64,
     peak: usize,
     range: Range<usize>,
 ) -> Vec<HitFault> {
     let mut faults = Vec::new();
     let pulse = range.start..(peak + (peak - range.start).max(BEFORE) * 2).min(range.end);
-    if flat(&force[pulse.clone()], rest) || stands(&force[pulse], rest, noises[0]) {
+    if is_clipped(&force[pulse], rest, noises[0], grains[0]) {
         faults.push(HitFault::ForceClipped);
     }
     let answer = &measured[range];
-    let middle = median(answer);
-    if flat(answer, middle) || stands(answer, middle, noises[1]) {
+    if is_clipped(answer, median(answer), noises[1], grains[1]) {
         faults.push(HitFault::MeasuredClipped);
     }
     faults
+}
+
+/// How finely a channel is resolved.
+#[derive(Clone, Copy)]
+struct Grain {
+    /// Distance of its levels; 0 if it shows none.
+    step: f64,
+    /// Number of samples for which each value is held.
+    hold: usize,
+}
+
+impl Grain {
+    fn of(samples: &[f64]) -> Self {
+        let held = repeats(samples).and_then(|found| found.hold);
+        Self {
+            step: quantisation(samples).map_or(0.0, |found| found.step),
+            hold: held.unwrap_or(1),
+        }
+    }
+}
+
+/// Whether part of a channel is clipped.
+fn is_clipped(samples: &[f64], rest: f64, noise: f64, grain: Grain) -> bool {
+    let fresh: Vec<f64> = samples.iter().step_by(grain.hold).copied().collect();
+    flat(&fresh, rest, grain.step) || stands(&fresh, rest, noise, grain.step)
 }
 
 /// Start of the pulse with this peak.
@@ -238,26 +278,45 @@ fn start_of(size: &impl Fn(usize) -> f64, peak: usize, largest: f64) -> usize {
     quiet.saturating_sub(BEFORE)
 }
 
-/// Whether the largest or smallest value occurs several times in a row.
-fn flat(samples: &[f64], rest: f64) -> bool {
+/// Whether the largest or smallest value occurs several times in a row, more often than on a round top in steps of the
+/// channel's resolution.
+fn flat(samples: &[f64], rest: f64, step: f64) -> bool {
     let far = |v: f64| (v - rest).abs();
     [f64::max as fn(f64, f64) -> f64, f64::min]
         .into_iter()
         .any(|pick| {
             let extreme = samples.iter().copied().fold(rest, pick);
-            let run = samples
-                .chunk_by(|a, b| a == b)
-                .filter(|c| c[0] == extreme)
-                .map(<[f64]>::len)
-                .max();
-            far(extreme) > 0.0 && run.is_some_and(|n| n >= FLAT)
+            let at_extreme = quality::runs(samples).filter(|run| run.value == extreme);
+            let longest = at_extreme.max_by_key(|run| run.length);
+            let longest = longest.filter(|run| far(extreme) > 0.0 && run.length >= FLAT);
+            longest.is_some_and(|run| !is_round(samples, run.start..run.end(), step))
         })
+}
+
+/// Whether equal samples are the top of a parabola in steps: of its samples within two steps of the peak, at least
+/// `1 − 1/√2` are in the second one. Where there is none, the next sample is no farther below than on a parabola that
+/// falls by one step from the middle to the ends of the top.
+fn is_round(samples: &[f64], top: Range<usize>, step: f64) -> bool {
+    let extreme = samples[top.start];
+    let below = |v: &f64| (v - extreme).abs();
+    let is_next = |v: &&f64| below(v) < 1.5 * step;
+    let (before, after) = (&samples[..top.start], &samples[top.end..]);
+    let next =
+        before.iter().rev().take_while(is_next).count() + after.iter().take_while(is_next).count();
+    let count = top.len();
+    if next > 0 {
+        return NEXT * next + UNEVEN >= count;
+    }
+    let neighbours = before.last().into_iter().chain(after.first());
+    let fall = neighbours.map(below).fold(f64::INFINITY, f64::min);
+    let farther = (count + 2) as f64 / count as f64;
+    count <= MOST_BARE && fall < (1.0 + farther * farther) * step
 }
 
 /// Whether a signal stays near its largest or smallest value longer than a pulse or oscillation does: with an amplifier
 /// that saturates before the converter, the limit is noisy. In each half cycle beyond half of the extreme, the samples
 /// near the extreme are counted; for a half-sine, the fraction `arccos(1 − w)/(π/3)` lies within `w` of its peak.
-fn stands(samples: &[f64], rest: f64, noise: f64) -> bool {
+fn stands(samples: &[f64], rest: f64, noise: f64, step: f64) -> bool {
     let extreme = |side: f64| {
         samples
             .iter()
@@ -272,7 +331,8 @@ fn stands(samples: &[f64], rest: f64, noise: f64) -> bool {
     limits.any(|(side, extreme)| {
         let size = |v: &f64| side * (v - rest);
         let near = near(noise, extreme);
-        let usual = (1.0 - near).acos() / std::f64::consts::FRAC_PI_3;
+        let within = (near + step / extreme).min(0.5);
+        let usual = (1.0 - within).acos() / std::f64::consts::FRAC_PI_3;
         let least = STANDING.max(LONGER * usual);
         let is_high = |v: &f64| size(v) >= 0.5 * extreme;
         let mut swings = samples.chunk_by(|a, b| is_high(a) == is_high(b));
@@ -546,6 +606,40 @@ mod tests {
                 hits[0].faults, want,
                 "limits {force_limit} and {swing_limit}"
             );
+        }
+    }
+
+    /// A converter of few steps, or a slow one, repeats the values of a round top.
+    #[test]
+    fn coarse_and_held_responses_are_not_clipped() {
+        for seed in 0..40 {
+            let cycle = 20.0 + 1.7 * f64::from(seed);
+            let limited = |limit: f64| -> Vec<f64> {
+                let one = |i: i32| {
+                    let t = f64::from(i - 500).max(0.0);
+                    let free = 10.0 * (-0.2 / cycle * t).exp();
+                    (free * (std::f64::consts::TAU * t / cycle).sin()).clamp(-limit, limit)
+                };
+                (0..4000).map(one).collect()
+            };
+            let mut force = vec![0.0; 4000];
+            pulse(500, 10.0, f64::INFINITY, &mut force);
+            let faults = |measured: &[f64]| find_hits(&force, measured, 1000)[0].faults.clone();
+            let (whole, cut) = (limited(f64::INFINITY), limited(5.5));
+            for steps in [20.0, 30.0, 60.0, 250.0] {
+                let coarse = |samples: &[f64]| -> Vec<f64> {
+                    let step = 20.0 / steps;
+                    samples.iter().map(|v| (v / step).round() * step).collect()
+                };
+                assert!(faults(&coarse(&whole)).is_empty(), "{cycle} {steps}");
+                assert_eq!(
+                    faults(&coarse(&cut)),
+                    [HitFault::MeasuredClipped],
+                    "{cycle} {steps}"
+                );
+            }
+            let held: Vec<f64> = (0..4000).map(|i| whole[i - i % 3]).collect();
+            assert!(faults(&held).is_empty(), "{cycle}");
         }
     }
 

@@ -76,6 +76,7 @@ struct State<'a> {
     values: Vec<f64>,
     residuals: Vec<f64>,
     cost: f64,
+    cost_at_start: f64,
     reduced: Reduced,
     scaling: Vec<f64>,
     lambda: f64,
@@ -118,9 +119,11 @@ impl<'a> State<'a> {
             differences: options.differences,
         };
         let (matrix, count) = jacobian(&evaluated, &how, &values, &residuals)?;
+        let cost = sum_of_squares(&residuals);
         let mut state = Self {
             reduced: reduce(&matrix, &residuals),
-            cost: sum_of_squares(&residuals),
+            cost,
+            cost_at_start: cost,
             scaling: vec![0.0; free.len()],
             lambda: FIRST_DAMPING,
             rise: 2.0,
@@ -301,6 +304,7 @@ impl<'a> State<'a> {
             at_bound,
             rms: (self.cost / self.residuals.len() as f64).sqrt(),
             sum_of_squares: self.cost,
+            sum_at_start: self.cost_at_start,
             degrees_of_freedom,
             residuals: self.residuals,
             stop,

@@ -48,6 +48,8 @@ pub struct Fit {
     pub rms: f64,
     /// Sum of their squares.
     pub sum_of_squares: f64,
+    /// The same at the start values.
+    pub sum_at_start: f64,
     /// Number of residuals minus number of parameters determined.
     pub degrees_of_freedom: usize,
     /// Reason for stopping.
