@@ -1,5 +1,6 @@
 //! `diagnose`: effects missing from the stand model, and the error before and after adding them.
 
+mod alike;
 mod checks;
 mod decays;
 mod declared;

@@ -94,6 +94,7 @@ pub fn fit(
     let mut records = records.to_vec();
     let start = &inside(&structure, start)[..];
     let start_model = structure.model(start).0;
+    OwnOfRecords::unload_others(&start_model, &mut records);
     let mut free = start_model.free_mode();
     // For an integrated motion, the initial state is corrected instead.
     let integrates = start_model.is_integrated();

@@ -49,6 +49,15 @@ impl OwnOfRecords {
         }
     }
 
+    /// Takes the constant load off the records for which it is no parameter: a start from a model for which it was one.
+    pub fn unload_others(model: &Chain, records: &mut [StandRecord]) {
+        let loaded = Self::preloaded(model, records.len());
+        let others = records.iter_mut().enumerate();
+        for (_, record) in others.filter(|(k, _)| !loaded.contains(k)) {
+            record.initial.preload = 0.0;
+        }
+    }
+
     /// Whether record `k` is an integrated free decay.
     pub fn is_ringing(&self, k: usize) -> bool {
         self.ringing.contains(&k)

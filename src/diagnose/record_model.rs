@@ -120,17 +120,22 @@ impl RecordModel {
     }
 
     /// The residual of a record with the optimum initial state. An integrated motion depends on it nonlinearly: the
-    /// search starts from the record's own state, from rest, and from the one estimated from a free decay, and
-    /// continues with Gauss–Newton steps while they help. `None` if the motion diverges.
+    /// search starts from the record's own state, from rest, and from the one that its beginning shows, and continues with Gauss–Newton steps while they help. `None` if the motion diverges.
     pub fn settled(&self, record: &StandRecord) -> Option<RecordResidual> {
         if !self.chain.is_integrated() {
             return self.residual(record.clone());
         }
-        let shown = record.is_free().then(|| self.shown_at_start(record));
-        let starts = [record.initial, InitialState::default()].into_iter();
-        let found = starts
-            .chain(shown.flatten())
-            .filter_map(|initial| self.residual(record.starting_from(initial)))
+        let from = |initial: InitialState| self.residual(record.starting_from(initial));
+        let own = from(record.initial);
+        let shown = match record.is_free() {
+            true => self.shown_at_start(record),
+            false => self.shown_at_first(record, own.as_ref()),
+        };
+        let others = [Some(InitialState::default()), shown];
+        let others = others.into_iter().flatten().filter_map(from);
+        let found = own
+            .into_iter()
+            .chain(others)
             .min_by(|a, b| a.sum_of_squares().total_cmp(&b.sum_of_squares()));
         let mut found = found?;
         for _ in 0..MOST_STARTS {
@@ -164,6 +169,30 @@ impl RecordModel {
             motion: MotionState {
                 x: swing[0] + swing[1] - mean,
                 speed: self.free.omega_rad_s * swing[2],
+            },
+            ..record.initial
+        })
+    }
+
+    /// Initial state of a driven record whose first samples follow a parabola, without the offset of a residual.
+    fn shown_at_first(
+        &self,
+        record: &StandRecord,
+        found: Option<&RecordResidual>,
+    ) -> Option<InitialState> {
+        let turn = self.free.omega_rad_s / record.rate_hz();
+        let count = ((0.25 * PI / turn).ceil() as usize).max(FEWEST);
+        let seen = record.measured.get(..count)?;
+        let row = |i| [1.0, i as f64, (i * i) as f64];
+        let rows: Vec<[f64; 3]> = (0..count).map(row).collect();
+        let matrix = DMatrix::from_row_slice(count, 3, rows.as_flattened());
+        let [x, slope, _] = solve(&matrix, seen, None, false).ok()?.values[..] else {
+            return None;
+        };
+        Some(InitialState {
+            motion: MotionState {
+                x: x - found.map_or(0.0, |found| found.nuisance.offset),
+                speed: slope * record.rate_hz(),
             },
             ..record.initial
         })

@@ -228,7 +228,8 @@ impl ScoredModel {
         self.train.records().iter().filter_map(of_record).sum()
     }
 
-    /// An essential parameter of the last effect that does not differ significantly from zero.
+    /// An essential parameter of the last effect that does not differ significantly from zero, or its size if that is
+    /// nearer to zero than its uncertainty: what such an effect explains, a better fit without it would.
     pub fn insignificant_parameter(&self) -> Option<&'static str> {
         let fitted = &self.fitted;
         let last = fitted.structure.effects.last()?;
@@ -242,9 +243,12 @@ impl ScoredModel {
             let largest = beside.map(|(j, _)| fitted.values[first + j].abs());
             value <= SIGNIFICANT * std || largest.fold(0.0, f64::max) * NEGLIGIBLE > value
         };
+        let is_no_size = |k: usize| {
+            let std = fitted.std[first + k].filter(|_| last.size() == Some(k));
+            std.is_some_and(|std| fitted.values[first + k].abs() < std)
+        };
         own()
-            .filter(|(_, p)| p.essential)
-            .find(|(k, _)| is_zero(*k))
+            .find(|(k, p)| p.essential && is_zero(*k) || is_no_size(*k))
             .map(|(_, p)| p.name)
     }
 

@@ -12,6 +12,7 @@ use std::collections::HashMap;
 
 use torqcomp_dsp::quality::clipping::Clipping;
 use torqcomp_dsp::quality::mains::MainsLine;
+use torqcomp_dsp::quality::quantisation::{Quantisation, quantisation};
 use torqcomp_dsp::quality::repeats::repeats;
 
 use crate::recording::{AlignedChannels, Channel, TimeAxis};
@@ -72,6 +73,19 @@ pub(crate) fn repeated(aligned: &AlignedChannels) -> Vec<Warning> {
     aligned.channels.iter().filter_map(of_channel).collect()
 }
 
+/// Warning about coarsely resolved channels, if there are any.
+pub(crate) fn coarse_of(channels: &[Channel]) -> Vec<Warning> {
+    let named = channels.iter().filter_map(|channel| {
+        let found = quantisation(&channel.samples).filter(samples::is_coarse)?;
+        Some((channel.name.as_str(), unit_of(channel), found))
+    });
+    let named: Vec<_> = named.collect();
+    match named.is_empty() {
+        true => Vec::new(),
+        false => vec![coarse(&named)],
+    }
+}
+
 /// Warning about constant channels.
 #[must_use]
 pub fn constant(channels: &[(&str, f64)]) -> Warning {
@@ -86,13 +100,7 @@ pub fn constant(channels: &[(&str, f64)]) -> Warning {
 
 /// Warning about coarsely resolved channels.
 #[must_use]
-pub fn coarse(
-    channels: &[(
-        &str,
-        &str,
-        torqcomp_dsp::quality::quantisation::Quantisation,
-    )],
-) -> Warning {
+pub fn coarse(channels: &[(&str, &str, Quantisation)]) -> Warning {
     let named = channels.iter().map(|(name, unit, q)| {
         format!(
             "\"{name}\" has {} steps of {} in its range ({} bits)",

@@ -23,6 +23,11 @@ const STATES: usize = 4;
 /// Minimum number of samples for a statement about resolution; fewer are a table of readings.
 const FEWEST: usize = 100;
 
+/// Whether a resolution is coarse for a measurement.
+pub(super) fn is_coarse(found: &Quantisation) -> bool {
+    found.levels < COARSE && found.seen > STATES
+}
+
 /// Number of samples below which a constant channel is not conspicuous.
 const FEW: usize = 10;
 
@@ -110,7 +115,7 @@ impl Findings {
     #[must_use]
     pub fn coarse(&self) -> Option<Quantisation> {
         self.quantisation
-            .filter(|q| q.levels < COARSE && q.seen > STATES)
+            .filter(is_coarse)
             .filter(|_| self.samples >= FEWEST && !self.is_straight)
     }
 

@@ -148,6 +148,7 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
         selection.warnings,
         clipped,
         held.into_iter().collect(),
+        quality::coarse_of(std::slice::from_ref(chosen)),
         jitter,
     ];
     let warnings = warnings.concat();

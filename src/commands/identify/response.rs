@@ -83,6 +83,7 @@ fn load(args: &Response, recorded: &mut Recorded) -> Result<Vec<AlignedChannels>
         recorded.warn(read.warnings.clone(), read.is_lossy);
         recorded.warn(quality::clipped(&read), false);
         recorded.warn(quality::repeated(&read), false);
+        recorded.warn(quality::coarse_of(&read.channels), false);
         if let Some(radius) = &args.radius {
             to_torque(&mut read.channels[0], radius)?;
         }
