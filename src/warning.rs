@@ -166,7 +166,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["channel-copy", "a channel is identical to another one", "use one of them"],
         ["channel-multiple", "a channel is a multiple of another one, apart from rounding", "use one of them"],
         ["clipped", "the signal is clipped at its highest or lowest value", "record with a larger range"],
-        ["coarse-quantisation", "the signal spans fewer than 256 quantisation steps, or stays within one for most of a window of a run-up", "use a smaller input range; for a run-up, a longer --window"],
+        ["coarse-quantisation", "the signal spans fewer than 256 quantisation steps (100 where it is fitted), or stays within one for most of a window of a run-up", "use a smaller input range; for a run-up, a longer --window"],
         ["constant-channel", "all samples are the same", "check the connection, or choose another channel"],
         ["identical-files", "files are identical, byte for byte; in a fit, they count twice, and its uncertainties are too small", "remove the copies"],
         ["mains-lines", "lines at multiples of 50 or 60 Hz stand out", "check grounding and shielding, or declare the effect mains-pickup"],

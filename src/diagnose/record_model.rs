@@ -120,7 +120,8 @@ impl RecordModel {
     }
 
     /// The residual of a record with the optimum initial state. An integrated motion depends on it nonlinearly: the
-    /// search starts from the record's own state, from rest, and from the one that its beginning shows, and continues with Gauss–Newton steps while they help. `None` if the motion diverges.
+    /// search starts from the record's own state, from rest, and from the one that its beginning shows, and continues
+    /// with Gauss–Newton steps while they help. `None` if the motion diverges.
     pub fn settled(&self, record: &StandRecord) -> Option<RecordResidual> {
         if !self.chain.is_integrated() {
             return self.residual(record.clone());
@@ -157,13 +158,10 @@ impl RecordModel {
     /// of the record's mean on which it lies.
     fn shown_at_start(&self, record: &StandRecord) -> Option<InitialState> {
         let measured = record.measured_in_range();
-        let turn = self.free.omega_rad_s / record.rate_hz();
-        let count = ((PI / turn).ceil() as usize).max(FEWEST);
-        let seen = record.measured.get(..count)?;
+        let turn = self.turn(record);
+        let count = (PI / turn).ceil() as usize;
         let row = |i| [1.0, (turn * i as f64).cos(), (turn * i as f64).sin()];
-        let rows: Vec<[f64; 3]> = (0..count).map(row).collect();
-        let matrix = DMatrix::from_row_slice(count, 3, rows.as_flattened());
-        let swing = solve(&matrix, seen, None, false).ok()?.values;
+        let swing = beginning(record, count, row)?;
         let mean = measured.iter().sum::<f64>() / measured.len() as f64;
         Some(InitialState {
             motion: MotionState {
@@ -180,22 +178,20 @@ impl RecordModel {
         record: &StandRecord,
         found: Option<&RecordResidual>,
     ) -> Option<InitialState> {
-        let turn = self.free.omega_rad_s / record.rate_hz();
-        let count = ((0.25 * PI / turn).ceil() as usize).max(FEWEST);
-        let seen = record.measured.get(..count)?;
-        let row = |i| [1.0, i as f64, (i * i) as f64];
-        let rows: Vec<[f64; 3]> = (0..count).map(row).collect();
-        let matrix = DMatrix::from_row_slice(count, 3, rows.as_flattened());
-        let [x, slope, _] = solve(&matrix, seen, None, false).ok()?.values[..] else {
-            return None;
-        };
+        let count = (0.25 * PI / self.turn(record)).ceil() as usize;
+        let parabola = beginning(record, count, |i| [1.0, i as f64, (i * i) as f64])?;
         Some(InitialState {
             motion: MotionState {
-                x: x - found.map_or(0.0, |found| found.nuisance.offset),
-                speed: slope * record.rate_hz(),
+                x: parabola[0] - found.map_or(0.0, |found| found.nuisance.offset),
+                speed: parabola[1] * record.rate_hz(),
             },
             ..record.initial
         })
+    }
+
+    /// Angle by which the free motion turns in a sample.
+    fn turn(&self, record: &StandRecord) -> f64 {
+        self.free.omega_rad_s / record.rate_hz()
     }
 
     /// A record with part of the correction of its initial state suggested by its residual.
@@ -208,4 +204,17 @@ impl RecordModel {
         record.initial.preload = preload.clamp(-limit, limit);
         record
     }
+}
+
+/// Coefficients of three functions of the number of the sample, fitted to the first samples of a record.
+fn beginning(
+    record: &StandRecord,
+    count: usize,
+    row: impl Fn(usize) -> [f64; 3],
+) -> Option<Vec<f64>> {
+    let count = count.max(FEWEST);
+    let seen = record.measured.get(..count)?;
+    let rows: Vec<[f64; 3]> = (0..count).map(row).collect();
+    let matrix = DMatrix::from_row_slice(count, 3, rows.as_flattened());
+    Some(solve(&matrix, seen, None, false).ok()?.values)
 }

@@ -73,10 +73,14 @@ pub(crate) fn repeated(aligned: &AlignedChannels) -> Vec<Warning> {
     aligned.channels.iter().filter_map(of_channel).collect()
 }
 
-/// Warning about coarsely resolved channels, if there are any.
+/// Number of levels below which the steps of a converter show in a fit to many samples.
+const SEEN_IN_A_FIT: f64 = 100.0;
+
+/// Warning about channels too coarse for a fit, if there are any.
 pub(crate) fn coarse_of(channels: &[Channel]) -> Vec<Warning> {
     let named = channels.iter().filter_map(|channel| {
-        let found = quantisation(&channel.samples).filter(samples::is_coarse)?;
+        let is_coarse = |q: &Quantisation| samples::is_coarse(q) && q.levels < SEEN_IN_A_FIT;
+        let found = quantisation(&channel.samples).filter(is_coarse)?;
         Some((channel.name.as_str(), unit_of(channel), found))
     });
     let named: Vec<_> = named.collect();
