@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::noise::Noise;
 use crate::one_mode::{DAMPING_RATIO, NATURAL_HZ, RATE_HZ, SAMPLES, record};
-use crate::util::Folder;
+use crate::util::{Folder, number};
 
 const MOMENT_S: f64 = 2.9;
 
@@ -18,10 +18,6 @@ fn diagnosed(law: impl Fn(f64, f64, f64) -> f64) -> (Value, f64) {
     let channels = ["--applied", "applied_n_m", "--measured", "measured_n_m"];
     let command = ["diagnose", "--json", "--train", "train.csv"];
     (folder.json(&[&command[..], &channels].concat()), noise_rms)
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().expect("a number")
 }
 
 /// A spring that loses 4 % of its stiffness: the natural frequency falls by `1 − √0.96`, the static gain grows by `1/0.96`.

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::motion;
 use crate::noise::Noise;
-use crate::util::Folder;
+use crate::util::{Folder, number};
 
 const RATE_HZ: f64 = 2000.0;
 const SAMPLES: usize = 8000;
@@ -98,12 +98,8 @@ impl Stand {
     }
 }
 
-pub fn number(value: &Value) -> f64 {
-    value.as_f64().expect("a number")
-}
-
 /// A parameter of the accepted effect: value and standard uncertainty.
-fn parameter(report: &Value, effect: &str, name: &str) -> [f64; 2] {
+pub fn parameter(report: &Value, effect: &str, name: &str) -> [f64; 2] {
     let candidates = report["candidates"].as_array().expect("candidates");
     let accepted = candidates
         .iter()

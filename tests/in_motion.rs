@@ -4,9 +4,10 @@ use std::f64::consts::TAU;
 
 use serde_json::Value;
 
+use crate::decays::parameter;
 use crate::motion;
 use crate::noise::Noise;
-use crate::util::Folder;
+use crate::util::{Folder, number};
 
 const NATURAL_HZ: f64 = 85.0;
 const DAMPING_RATIO: f64 = 0.015;
@@ -52,7 +53,7 @@ fn records(law: impl Fn(f64) -> f64, seed: u64) -> Folder {
         };
         let h = 1.0 / (RATE_HZ * STEPS as f64);
         let mut state = [torque(0.0), 0.0];
-        let mut text = "time_s,applied_n_m,measured_n_m\n".to_owned();
+        let mut text = "time_s,applied [N m],measured [N m]\n".to_owned();
         for i in 0..SAMPLES {
             let t = i as f64 / RATE_HZ;
             let seen = state[0] + NOISE * noise.normal();
@@ -73,25 +74,9 @@ fn diagnosed(folder: &Folder, [natural_hz, damping_ratio]: [f64; 2], effect: &st
     let stand = format!("schema = \"torqcomp.stand/1\"\n[mechanics]\n{mechanics}{effect}");
     folder.write("stand.toml", stand);
     let records = ["--train", "train.csv", "--holdout", "holdout.csv"];
-    let channels = ["--applied", "applied_n_m", "--measured", "measured_n_m"];
+    let channels = ["--applied", "applied", "--measured", "measured"];
     let args = ["diagnose", "--stand", "stand.toml", "--json"];
     folder.json(&[&args[..], &records, &channels].concat())
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or(f64::NAN)
-}
-
-/// Value and std of a parameter of the accepted effect.
-fn parameter(report: &Value, name: &str) -> [f64; 2] {
-    let accepted = &report["candidates"][0];
-    assert_eq!(accepted["status"], "accepted", "{accepted}");
-    let own = accepted["parameters"].as_array().expect("a list");
-    let found = own
-        .iter()
-        .find(|p| p["name"] == name)
-        .expect("the parameter");
-    ["value", "std"].map(|key| number(&found[key]))
 }
 
 const NEAR: [f64; 2] = [80.0, 0.02];
@@ -125,7 +110,7 @@ fn a_spring_that_stiffens_is_named() {
             let said = format!("{form} {seed}: {named:?} {}", report["error"]);
             assert_eq!(report["effects"], serde_json::json!([name]), "{said}");
             assert_eq!(report["verdict"], "explained", "{said}");
-            let [value, std] = parameter(&report, "coefficient");
+            let [value, std] = parameter(&report, name, "coefficient");
             assert!((value - truth).abs() < 3.5 * std, "{said} {value} {std}");
 
             // The stand file that is right is as good after a fit as before it.
@@ -169,7 +154,7 @@ fn a_stop_on_one_side_has_a_place() {
         assert_eq!(report["verdict"], "explained", "{said}");
         assert_eq!(report["candidates"][0]["form"], "above", "{said}");
         for (name, truth) in [("gap", gap), ("stiffness_ratio", 2.0)] {
-            let [value, std] = parameter(&report, name);
+            let [value, std] = parameter(&report, "end-stop", name);
             assert!((value - truth).abs() < 4.0 * std, "{said}");
             assert!(std < 0.05 * truth, "{said}");
         }
@@ -189,20 +174,13 @@ fn a_record_in_a_thousandth_of_the_unit_is_converted() {
         };
         format!("{t},{},{}\n", factor * u, factor * y)
     };
-    for (name, unit, factor) in [("train.csv", "N m", 1.0), ("holdout.csv", "mN m", 1e3)] {
-        let text = folder.read(name);
-        let rows = text.lines().skip(1).map(|line| cells(line, factor));
-        let heading = format!("time_s,applied [{unit}],measured [{unit}]\n");
-        folder.write(name, heading + &rows.collect::<String>());
-    }
+    let text = folder.read("holdout.csv");
+    let rows: String = text.lines().skip(1).map(|line| cells(line, 1e3)).collect();
     folder.write(
-        "stand.toml",
-        "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"80 Hz\"\ndamping_ratio = 0.02\n",
+        "holdout.csv",
+        format!("time_s,applied [mN m],measured [mN m]\n{rows}"),
     );
-    let records = ["--train", "train.csv", "--holdout", "holdout.csv"];
-    let channels = ["--applied", "applied", "--measured", "measured"];
-    let args = ["diagnose", "--stand", "stand.toml", "--json"];
-    let report = folder.json(&[&args[..], &records, &channels].concat());
+    let report = diagnosed(&folder, NEAR, "");
     assert_eq!(
         report["effects"],
         serde_json::json!(["cubic-stiffness"]),

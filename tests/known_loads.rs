@@ -3,9 +3,9 @@
 
 use serde_json::{Value, json};
 
-use crate::decays::{NOISE, PLAIN, Stand, number};
+use crate::decays::{NOISE, PLAIN, Stand};
 use crate::noise::Noise;
-use crate::util::{Folder, codes};
+use crate::util::{Folder, codes, number};
 
 /// Recorded per load, in V/(N m).
 const GAIN: f64 = 0.08;

@@ -5,10 +5,10 @@ use std::f64::consts::TAU;
 
 use serde_json::Value;
 
-use crate::decays::{NOISE, PLAIN, Stand, number};
+use crate::decays::{NOISE, PLAIN, Stand};
 use crate::motion;
 use crate::noise::Noise;
-use crate::util::{Folder, codes};
+use crate::util::{Folder, codes, number};
 
 const RATE_HZ: f64 = 200.0;
 const STEPS: usize = 8;

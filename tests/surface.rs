@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::noise::Noise;
 use crate::one_mode::{NATURAL_HZ, RATE_HZ, record};
-use crate::util::Folder;
+use crate::util::{Folder, number};
 
 /// A torque over displacement and over speed divided by `ω`, in N m, in addition to a spring of 1.
 type Law = fn(f64, f64) -> f64;
@@ -27,10 +27,6 @@ fn diagnosed(law: Law, folder: &Folder, more: &[&str]) -> (Value, f64) {
         .write("train.csv", train)
         .write("holdout.csv", holdout);
     (report(folder, more), rms)
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().expect("a number")
 }
 
 /// Points of a curve: position, torque, standard uncertainty.

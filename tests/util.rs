@@ -59,6 +59,11 @@ pub fn signal(name: &str, child: &std::process::Child) {
     assert!(sent.expect("kill is there").success(), "{name}");
 }
 
+/// A number of a report.
+pub fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
 /// The codes of the warnings in a report.
 pub fn codes(report: &Value) -> Vec<&str> {
     let warnings = report["warnings"].as_array().expect("warnings");

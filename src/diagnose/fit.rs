@@ -7,7 +7,7 @@ use torqcomp_model::fit::{self, Differences, Fit, FitError, Options, Parameter};
 use torqcomp_model::{Chain, Mode};
 
 use super::own_of_records::{OwnOfRecords, within};
-use super::record::{InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord, StateSlopes};
+use super::record::{InitialState, Nuisance, NuisanceFit, NuisanceTerms, StandRecord};
 use super::record_model::RecordModel;
 use super::structure::{EffectForm, PlainStand, Structure};
 use super::unexplained::{Unexplained, raw_residual};
@@ -387,16 +387,17 @@ impl FittedModel {
 
     /// Nuisance terms of a record. The initial state of an integrated free decay is part of the model instead.
     pub fn nuisance(&self, record: &StandRecord, terms: &NuisanceTerms) -> Nuisance {
-        let slopes = self.state_slopes(record).map(|slopes| StateSlopes {
-            preload: slopes.preload.filter(|_| record.is_free()),
-            ..slopes
-        });
+        let model = self.record_model();
+        let slopes = match record.is_free() {
+            true => model.slopes(record),
+            false => model.slopes_of_motion(record),
+        };
         record.nuisance(&self.free, terms, slopes)
     }
 
     /// The same with the displacement under an unknown constant load, if the model depends on it.
     pub fn nuisance_under_load(&self, record: &StandRecord, terms: &NuisanceTerms) -> Nuisance {
-        record.nuisance(&self.free, terms, self.state_slopes(record))
+        record.nuisance(&self.free, terms, self.record_model().slopes(record))
     }
 
     /// The same for training record `k`, whose load may be part of the model's parameters instead.
@@ -408,13 +409,8 @@ impl FittedModel {
         }
     }
 
-    fn state_slopes(&self, record: &StandRecord) -> Option<StateSlopes> {
-        let model = RecordModel::of(&self.structure, &self.values, self.free);
-        let slopes = model
-            .chain
-            .is_integrated()
-            .then(|| model.residual_and_slopes(record));
-        Some(slopes??.1)
+    fn record_model(&self) -> RecordModel {
+        RecordModel::of(&self.structure, &self.values, self.free)
     }
 
     /// Residual of the fitted model on a record, with only the record's own constants, initial state and phases
@@ -433,7 +429,7 @@ impl FittedModel {
         record: &StandRecord,
         find: impl Fn(&RecordModel, &StandRecord) -> Option<RecordResidual>,
     ) -> Option<RecordResidual> {
-        let model = RecordModel::of(&self.structure, &self.values, self.free);
+        let model = self.record_model();
         let mut found = find(&model, record)?;
         self.restore_amplitudes(&model.terms, &mut found);
         Some(found)

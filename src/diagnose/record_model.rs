@@ -81,13 +81,18 @@ impl RecordModel {
         Some((residual, StateSlopes { motion, preload }))
     }
 
-    /// Derivatives of a record with respect to its initial displacement and speed, if the motion is integrated: far from
-    /// those of the linear stand where an effect changes its frequency.
+    /// Derivatives of a record with respect to its initial state, if the motion is integrated: far from those of the
+    /// linear stand where an effect changes its frequency.
+    pub fn slopes(&self, record: &StandRecord) -> Option<StateSlopes> {
+        let is_integrated = self.chain.is_integrated();
+        let found = is_integrated.then(|| self.residual_and_slopes(record));
+        Some(found??.1)
+    }
+
+    /// The same without the constant load, if the motion from the record's start lasts.
     pub fn slopes_of_motion(&self, record: &StandRecord) -> Option<StateSlopes> {
-        if !(self.chain.is_integrated() && record.has_free_motion(&self.free)) {
-            return None;
-        }
-        let (_, slopes) = self.residual_and_slopes(record)?;
+        let lasts = record.has_free_motion(&self.free);
+        let slopes = lasts.then(|| self.slopes(record)).flatten()?;
         Some(StateSlopes {
             preload: None,
             ..slopes

@@ -113,8 +113,8 @@ pub const FOR_FIRST_EFFECT: SearchEffort = SearchEffort {
     full: 12,
     promising: 0.5,
 };
-/// The second start of a form hardly ever leads farther than the first here. With an accepted effect, the gain of a first fit predicts that of the last one less well: all parameters must move
-/// together.
+/// The second start of a form hardly ever leads farther than the first here. With an accepted effect, the gain of a
+/// first fit predicts that of the last one less well: all parameters must move together.
 const FOR_SECOND_EFFECT: SearchEffort = SearchEffort {
     starts: 1,
     first: usize::MAX,

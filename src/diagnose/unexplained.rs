@@ -4,7 +4,7 @@ use torqcomp_model::fit::{FitError, Residuals};
 use torqcomp_model::{Chain, Mode, StandRun};
 
 use super::own_of_records::OwnOfRecords;
-use super::record::{Nuisance, NuisanceTerms, StandRecord};
+use super::record::{Nuisance, NuisanceTerms, StandRecord, StateSlopes};
 use super::record_model::RecordModel;
 use super::several_modes::{ModeSlopes, SeveralModes};
 use super::structure::Structure;
@@ -39,9 +39,9 @@ impl<'a> Unexplained<'a> {
         problem.fixed = free.map(|free| {
             let model = RecordModel::of(structure, start, *free);
             let terms = model.terms.clone().lasting();
-            let of = |(k, record): (usize, &StandRecord)| match of_records.is_ringing(k) {
-                true => record.nuisance_beside_motion(&terms),
-                false => record.nuisance(free, &terms, model.slopes_of_motion(record)),
+            let of = |(k, record): (usize, &StandRecord)| {
+                let slopes = || model.slopes_of_motion(record);
+                problem.nuisance((k, record), free, &terms, slopes)
             };
             records.iter().enumerate().map(of).collect()
         });
@@ -52,14 +52,14 @@ impl<'a> Unexplained<'a> {
 
     fn nuisance(
         &self,
-        k: usize,
-        record: &StandRecord,
+        (k, record): (usize, &StandRecord),
         free: &Mode,
         terms: &NuisanceTerms,
+        slopes: impl FnOnce() -> Option<StateSlopes>,
     ) -> Nuisance {
         match self.of_records.is_ringing(k) {
             true => record.nuisance_beside_motion(terms),
-            false => record.nuisance(free, terms, None),
+            false => record.nuisance(free, terms, slopes()),
         }
     }
 }
@@ -134,7 +134,8 @@ impl Unexplained<'_> {
             let Ok(residual) = residual else { continue };
             let Some(fixed) = &self.fixed else {
                 let free = chain.free_mode();
-                self.nuisance(k, record, &free, terms).clear(residual);
+                let nuisance = self.nuisance((k, record), &free, terms, || None);
+                nuisance.clear(residual);
                 continue;
             };
             let known = last.take().filter(|(of, _)| *of == terms);

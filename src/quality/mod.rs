@@ -79,8 +79,10 @@ const SEEN_IN_A_FIT: f64 = 100.0;
 /// Warning about channels too coarse for a fit, if there are any.
 pub(crate) fn coarse_of(channels: &[Channel]) -> Vec<Warning> {
     let named = channels.iter().filter_map(|channel| {
-        let is_coarse = |q: &Quantisation| samples::is_coarse(q) && q.levels < SEEN_IN_A_FIT;
-        let found = quantisation(&channel.samples).filter(is_coarse)?;
+        let found = quantisation(&channel.samples)?;
+        if !samples::is_coarse(&found, SEEN_IN_A_FIT) {
+            return None;
+        }
         Some((channel.name.as_str(), unit_of(channel), found))
     });
     let named: Vec<_> = named.collect();

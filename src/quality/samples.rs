@@ -23,13 +23,13 @@ const STATES: usize = 4;
 /// Minimum number of samples for a statement about resolution; fewer are a table of readings.
 const FEWEST: usize = 100;
 
-/// Whether a resolution is coarse for a measurement.
-pub(super) fn is_coarse(found: &Quantisation) -> bool {
-    found.levels < COARSE && found.seen > STATES
-}
-
 /// Number of samples below which a constant channel is not conspicuous.
 const FEW: usize = 10;
+
+/// Whether a measurement has fewer levels than that.
+pub(super) fn is_coarse(found: &Quantisation, levels: f64) -> bool {
+    found.levels < levels && found.seen > STATES
+}
 
 /// Findings about the samples of a channel.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -115,7 +115,7 @@ impl Findings {
     #[must_use]
     pub fn coarse(&self) -> Option<Quantisation> {
         self.quantisation
-            .filter(is_coarse)
+            .filter(|q| is_coarse(q, COARSE))
             .filter(|_| self.samples >= FEWEST && !self.is_straight)
     }
 

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use crate::noise::Noise;
-use crate::util::Folder;
+use crate::util::{Folder, codes};
 
 const RATE_HZ: f64 = 5000.0;
 
@@ -116,11 +116,8 @@ fn the_noise_of_the_force_of_several_hits_counts_once() {
     }
 }
 
-/// Report of four hits of unequal force on a stand of 100 Hz; `recorder` makes a sample of the motion and its row.
-fn four_hits(
-    seed: u64,
-    recorder: impl Fn(&dyn Fn(usize) -> f64, usize) -> f64,
-) -> serde_json::Value {
+/// Report of four hits of unequal force on a stand of 100 Hz; `recorder` makes a sample of the motion, at most 1.
+fn four_hits(seed: u64, recorder: impl Fn(f64) -> f64) -> serde_json::Value {
     let mut noise = Noise(seed);
     let rows = [1.0, 0.62, 0.85, 0.47].into_iter().flat_map(|size| {
         let rows = hit(100.0, 0.03, 0.003, 0.02).into_iter();
@@ -129,8 +126,8 @@ fn four_hits(
     let rows: Vec<(f64, f64)> = rows.collect();
     let largest = rows.iter().fold(0.0, |m: f64, (_, x)| m.max(x.abs()));
     let mut text = String::from("time_s,force [N m],bridge [V]\n");
-    for (row, (force, _)) in rows.iter().enumerate() {
-        let seen = recorder(&|row| rows[row].1 / largest, row);
+    for (row, (force, x)) in rows.iter().enumerate() {
+        let seen = recorder(x / largest);
         let force = force + 1e-3 * noise.normal();
         let _ = writeln!(text, "{:.4},{force:.6},{seen:.9}", row as f64 / RATE_HZ);
     }
@@ -140,22 +137,17 @@ fn four_hits(
     folder.json(&[&verb[..], &["--applied", "force", "--measured", "bridge"]].concat())
 }
 
-fn warned(report: &serde_json::Value) -> Vec<&str> {
-    let all = report["warnings"].as_array().expect("a list").iter();
-    all.filter_map(|w| w["code"].as_str()).collect()
-}
-
 /// An amplifier that saturates softly had made the static gain up to 34 % too small without a warning.
 #[test]
 fn distortion_by_hits_is_said() {
     for seed in [1, 2] {
         for (part, is_said) in [(0.0, false), (0.5, true), (1.0, true), (2.0, true)] {
-            let report = four_hits(seed, |x, row| match part {
-                0.0 => x(row),
-                part => (part * x(row)).tanh() / part,
+            let report = four_hits(seed, |x| match part {
+                0.0 => x,
+                part => (part * x).tanh() / part,
             });
-            let codes = warned(&report);
-            assert_eq!(codes.contains(&"overtone"), is_said, "{part}: {report}");
+            let found = codes(&report);
+            assert_eq!(found.contains(&"overtone"), is_said, "{part}: {report}");
         }
     }
 }
@@ -163,16 +155,14 @@ fn distortion_by_hits_is_said() {
 /// Steps of a converter had been taken for a limit.
 #[test]
 fn coarse_hits_are_used() {
-    let report = four_hits(4, |x, row| (x(row) * 40.0).round() / 40.0);
-    let codes = warned(&report);
-    assert!(!codes.contains(&"hit-left-out"), "{report}");
-    assert!(codes.contains(&"coarse-quantisation"), "{report}");
-    let all = report["parameters"].as_array().expect("parameters");
-    let gain = all
-        .iter()
-        .find(|p| p["name"] == "static_gain")
-        .expect("the gain");
-    let [value, std] = ["value", "std"].map(|key| gain[key].as_f64().expect("a number"));
+    let report = four_hits(4, |x| (x * 40.0).round() / 40.0);
+    let found = codes(&report);
+    assert!(!found.contains(&"hit-left-out"), "{report}");
+    assert!(found.contains(&"coarse-quantisation"), "{report}");
+    let (value, std, _) = super::parameter(&report, "static_gain");
     // The largest motion is 1.05199 of the static one.
-    assert!((value - 1.0 / 1.05199).abs() < 3.0 * std, "{report}");
+    assert!(
+        (value - 1.0 / 1.05199).abs() < 3.0 * std.expect("a std"),
+        "{report}"
+    );
 }

@@ -35,20 +35,16 @@ pub(super) fn make_alike(first: &Pair, other: &mut Pair) -> Result<(), Failure> 
         NamedUnit::factor_between(from, to).ok_or_else(differ)
     };
     let of_measured = factor(|pair| &pair.measured_unit)?;
-    let of_applied = match first.applied.is_some() && other.applied.is_some() {
-        true => factor(|pair| &pair.applied_unit)?,
-        false => 1.0,
-    };
-    let applied = other.applied.iter_mut().flatten();
-    applied.for_each(|value| *value *= of_applied);
-    other
-        .measured
-        .iter_mut()
-        .for_each(|value| *value *= of_measured);
-    other.measured_unit.clone_from(&first.measured_unit);
-    if other.applied.is_some() && first.applied.is_some() {
+    // A free decay has none.
+    if first.applied.is_some() && other.applied.is_some() {
+        let of_applied = factor(|pair| &pair.applied_unit)?;
+        let applied = other.applied.iter_mut().flatten();
+        applied.for_each(|value| *value *= of_applied);
         other.applied_unit.clone_from(&first.applied_unit);
     }
+    let measured = other.measured.iter_mut();
+    measured.for_each(|value| *value *= of_measured);
+    other.measured_unit.clone_from(&first.measured_unit);
     Ok(())
 }
 

@@ -62,10 +62,13 @@ fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
 
 /// Rejects loads or readings of another kind than the records; units of one kind may differ.
 pub(super) fn check_units(loads: &[Pair], record: &Pair) -> Result<(), Failure> {
-    let kind = |unit: &Option<NamedUnit>| unit.as_ref().map(|named| named.unit.dimension());
+    let are_apart = |units: [&Option<NamedUnit>; 2]| {
+        let [from, to] = units.map(Option::as_ref);
+        NamedUnit::factor_between(from, to).is_none()
+    };
     let differs = |load: &&Pair| {
-        kind(&load.applied_unit) != kind(&record.applied_unit)
-            || kind(&load.measured_unit) != kind(&record.measured_unit)
+        are_apart([&load.applied_unit, &record.applied_unit])
+            || are_apart([&load.measured_unit, &record.measured_unit])
     };
     match loads.iter().find(differs) {
         None => Ok(()),

@@ -9,6 +9,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::io::{ChannelChoice, Input};
 use crate::recording::AlignedChannels;
 use crate::stand::Stand;
+use crate::unit::NamedUnit;
 
 /// The record of the measured quantity alone.
 pub(super) fn measured_alone(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
@@ -33,11 +34,11 @@ pub(super) fn measured_alone(args: &Diagnose, file: &Path) -> Result<Pair, Failu
 pub(super) fn pairs(args: &Diagnose, record: &Pair) -> Result<Vec<Pair>, Failure> {
     let running = args.running.iter().map(|file| measured_alone(args, file));
     let running: Vec<Pair> = running.collect::<Result<_, _>>()?;
-    let kind = |pair: &Pair| {
-        let named = pair.measured_unit.as_ref();
-        named.map(|named| named.unit.dimension())
+    let differs = |other: &&Pair| {
+        let [from, to] = [*other, record].map(|pair| pair.measured_unit.as_ref());
+        NamedUnit::factor_between(from, to).is_none()
     };
-    match running.iter().find(|other| kind(other) != kind(record)) {
+    match running.iter().find(differs) {
         None => Ok(running),
         Some(other) => Err(Failure::failed(
             ErrorCode::RecordsDiffer,

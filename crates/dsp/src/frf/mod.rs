@@ -7,6 +7,7 @@
 
 mod blocks;
 mod hits;
+mod limits;
 
 use num_complex::Complex64;
 
