@@ -189,3 +189,61 @@ fn a_record_in_a_thousandth_of_the_unit_is_converted() {
     let left = number(&report["error"]["after"]["holdout_rms"]);
     assert!((0.9..1.1).contains(&(left / NOISE)), "{left}");
 }
+
+/// Plateaus from rest of a stand with two modes, from the closed step response
+/// `1 − e^(−ζωt) (cos ω_d t + ζω/ω_d sin ω_d t)` of each.
+fn plateaus(modes: [[f64; 3]; 2], seed: u64) -> Folder {
+    let mut noise = Noise(seed);
+    let step = |[hz, damping, share]: [f64; 3], t: f64| {
+        let omega = TAU * hz;
+        let turning = omega * (1.0 - damping * damping).sqrt();
+        let (sine, cosine) = (turning * t).sin_cos();
+        let swing = cosine + damping * omega / turning * sine;
+        share * (1.0 - (-damping * omega * t).exp() * swing)
+    };
+    let folder = Folder::new();
+    for (name, level) in [("train.csv", 1.0), ("holdout.csv", LOWER)] {
+        let levels: Vec<f64> = (0..25)
+            .map(|_| level * (4.0 * noise.uniform() - 2.0))
+            .collect();
+        let mut text = "time_s,applied [N m],measured [N m]\n".to_owned();
+        for i in 0..SAMPLES {
+            let t = i as f64 / RATE_HZ;
+            let begins = |k: usize| (k * SAMPLES / levels.len()) as f64 / RATE_HZ;
+            let so_far = (0..levels.len()).filter(|k| begins(*k) <= t);
+            let response = so_far.clone().map(|k| {
+                let change = levels[k] - if k > 0 { levels[k - 1] } else { 0.0 };
+                change * (step(modes[0], t - begins(k)) + step(modes[1], t - begins(k)))
+            });
+            let seen = response.sum::<f64>() + 0.5 * NOISE * noise.normal();
+            let applied = levels[so_far.last().expect("the first plateau")];
+            text += &format!("{t:.4},{applied:.9},{seen:.9}\n");
+        }
+        folder.write(name, text);
+    }
+    folder
+}
+
+/// A mode added to the stand also rings after the first plateau, which had been fitted as if it had lasted forever: what
+/// was left was named friction, as a stand with friction was integrated from rest.
+#[test]
+fn a_second_mode_rings_from_the_start() {
+    for (seed, second) in [(1, [27.0, 0.004, 0.05]), (2, [31.0, 0.008, -0.04])] {
+        let first = [NATURAL_HZ, DAMPING_RATIO, 1.0 - second[2]];
+        let report = diagnosed(&plateaus([first, second], seed), NEAR, "");
+        let named = (&report["effects"], &report["verdict"], &report["error"]);
+        assert_eq!(
+            report["effects"],
+            serde_json::json!(["second-mode"]),
+            "{named:?}"
+        );
+        assert_eq!(report["verdict"], "explained", "{named:?}");
+        let after = number(&report["error"]["after"]["train_rms"]);
+        assert!(after < 1.03 * 0.5 * NOISE, "{named:?}");
+        let [value, std] = parameter(&report, "second-mode", "frequency");
+        assert!(
+            (value - second[0]).abs() < 3.5 * std,
+            "{named:?} {value} {std}"
+        );
+    }
+}

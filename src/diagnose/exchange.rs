@@ -28,6 +28,12 @@ const FOR_EXCHANGE: SearchEffort = SearchEffort {
     full: 2,
     promising: 0.5,
 };
+/// Where only effects that resemble the present one are tried, so that each gets a full fit besides those with several
+/// forms.
+const AMONG_ALIKE: SearchEffort = SearchEffort {
+    full: 6,
+    ..FOR_EXCHANGE
+};
 /// Fit of another form, starting where the present one ended.
 const OTHER_FORM: FitEffort = FitEffort::full(15);
 /// The effect that changes the recorded value of a constant load.
@@ -73,7 +79,8 @@ impl SearchState {
             let effect = form.effect;
             let base = BaseModel::of(less.clone(), &self.records);
             let among = |e: &Effect| is_open || e.name == effect.name || effect.resembles(e);
-            let round = try_effects(&base, among, &FOR_EXCHANGE, &self.records, silent);
+            let effort = if is_open { &FOR_EXCHANGE } else { &AMONG_ALIKE };
+            let round = try_effects(&base, among, effort, &self.records, silent);
             let passes = |model: &ScoredModel| refusal(model, &less).is_none();
             let singles = round.tried.into_iter().filter_map(|c| {
                 let model = c.model.filter(passes)?;
@@ -109,31 +116,93 @@ impl SearchState {
 }
 
 impl SearchState {
-    /// Changes the form of effects together with a gain error, if that explains the records better; returns whether any
-    /// changed. Whether a torque is part of the stand's stiffness, and whether the gage shows it, changes the recorded
-    /// value of a constant load: with a wrong declared gain, the wrong form may be the best of each alone.
+    /// Changes the form of effects while a gain error is added or removed, if that explains the records better, or equally
+    /// well without it; returns whether any changed. Whether a torque is part of the stand's stiffness, and whether the
+    /// gage shows it, changes the recorded value of a constant load: a gain error makes up for the wrong form.
     pub(super) fn exchange_with_gain(&mut self, coarse: usize, workers: Workers) -> bool {
-        let gain = listed(&self.after.fitted.structure).find(|effect| effect.name == GAIN);
-        let Some(effect) = gain.filter(|_| self.has_room()) else {
-            return false;
+        let mut named = self.after.effect_names().into_iter();
+        let best = match named.any(|name| name == GAIN) {
+            true => self.without_gain(workers),
+            false => self.with_gain(workers),
         };
-        let gain = EffectForm {
-            effect,
-            form: &effect.forms[0],
-        };
-        let starts = self.after.with_gain_in_other_forms(gain);
-        let models = self
-            .after
-            .fitted_from(&starts, &self.records, workers.threads);
-        let better = models.into_iter().filter(|model| {
-            refusal(model, &self.after).is_none() && !self.excess().is_too_small(&self.after, model)
-        });
-        let best = better.min_by(|a, b| a.criterion().total_cmp(&b.criterion()));
         if let Some(best) = &best {
             self.take(best, coarse);
         }
         best.is_some()
     }
+
+    /// The best model with a gain error and another form of an effect, if it is better.
+    fn with_gain(&self, workers: Workers) -> Option<ScoredModel> {
+        let gain = listed(&self.after.fitted.structure).find(|effect| effect.name == GAIN);
+        let effect = gain.filter(|_| self.has_room())?;
+        let gain = EffectForm {
+            effect,
+            form: &effect.forms[0],
+        };
+        let starts = self.after.with_gain_in_other_forms(gain);
+        self.best_from(&starts, workers, |model| {
+            refusal(model, &self.after).is_none() && !self.excess().is_too_small(&self.after, model)
+        })
+    }
+
+    /// The best model without its gain error and with another form of an effect, if it is as good.
+    fn without_gain(&self, workers: Workers) -> Option<ScoredModel> {
+        let fitted = &self.after.fitted;
+        let is_gain = |k: usize| {
+            k >= fitted.structure.declared && fitted.structure.effects[k].effect.name == GAIN
+        };
+        let (structure, values) = fitted.structure.reduced(&fitted.values, |k| !is_gain(k));
+        let starts = in_other_forms(&structure, &values);
+        self.best_from(&starts, workers, |model| {
+            model.criterion() < self.after.criterion() + SAME
+        })
+    }
+
+    /// The best of the models from some starts that pass a criterion.
+    fn best_from(
+        &self,
+        starts: &[(Structure, Vec<f64>)],
+        workers: Workers,
+        passes: impl Fn(&ScoredModel) -> bool,
+    ) -> Option<ScoredModel> {
+        let models = self
+            .after
+            .fitted_from(starts, &self.records, workers.threads);
+        let passing = models.into_iter().filter(passes);
+        passing.min_by(|a, b| a.criterion().total_cmp(&b.criterion()))
+    }
+}
+
+/// Structures in which one of the added effects of the stand has another form, and start values with the same stiffness.
+fn in_other_forms(structure: &Structure, values: &[f64]) -> Vec<(Structure, Vec<f64>)> {
+    let stiffness = |structure: &Structure, values: &[f64]| {
+        let (chain, _) = structure.model(values);
+        1.0 + chain.added_stiffness()
+    };
+    let present = stiffness(structure, values);
+    let mut next = structure.context.plain_count();
+    let mut starts = Vec::new();
+    for (k, effect) in structure.effects.iter().enumerate() {
+        let own = next..next + effect.moved();
+        next = own.end;
+        if k < structure.declared || effect.form.stage != Stage::Stand {
+            continue;
+        }
+        let forms = effect.effect.forms.iter();
+        for form in forms.filter(|form| form.name != effect.form.name) {
+            let mut other = structure.clone();
+            other.effects[k].form = form;
+            let mut values = values.to_vec();
+            let moved = own_in_form(form, effect.form, &values[own.clone()]);
+            values.splice(own.clone(), moved);
+            let factor = stiffness(&other, &values) / present;
+            if factor > 0.0 {
+                values[0] /= factor.sqrt();
+                starts.push((other, values));
+            }
+        }
+    }
+    starts
 }
 
 impl ScoredModel {
@@ -142,39 +211,19 @@ impl ScoredModel {
     fn with_gain_in_other_forms(&self, gain: EffectForm) -> Vec<(Structure, Vec<f64>)> {
         let fitted = &self.fitted;
         let small = SMALL * fitted.structure.context.scales.rms;
-        let at_rest = |structure: &Structure, values: &[f64]| {
-            let chain = structure.model(values).0;
-            let shown = chain.under_slow_loads(&[small / chain.gain.abs()]);
-            [1.0 + chain.added_stiffness(), shown[0] / small]
+        let shown = |structure: &Structure, values: &[f64]| {
+            let (chain, _) = structure.model(values);
+            chain.under_slow_loads(&[small / chain.gain.abs()])[0] / small
         };
-        let [stiff, shown] = at_rest(&fitted.structure, &fitted.values);
-        let mut next = fitted.structure.context.plain_count();
-        let mut starts = Vec::new();
-        for (k, present) in fitted.structure.effects.iter().enumerate() {
-            let own = next..next + present.moved();
-            next = own.end;
-            if k < fitted.structure.declared || present.form.stage != Stage::Stand {
-                continue;
-            }
-            let forms = present.effect.forms.iter();
-            for form in forms.filter(|form| form.name != present.form.name) {
-                let mut structure = fitted.structure.with(gain);
-                structure.effects[k].form = form;
-                let mut values = fitted.values.clone();
-                let moved = own_in_form(form, present.form, &values[own.clone()]);
-                values.splice(own.clone(), moved);
-                values.push(0.0);
-                let [stiffer, shows] = at_rest(&structure, &values);
-                let (factor, error) = (stiffer / stiff, shown / shows - 1.0);
-                if factor > 0.0 && error.abs() < 1.0 {
-                    values[0] /= factor.sqrt();
-                    let last = values.len() - 1;
-                    values[last] = error;
-                    starts.push((structure, values));
-                }
-            }
-        }
-        starts
+        let present = shown(&fitted.structure, &fitted.values);
+        let values = [&fitted.values[..], &[0.0]].concat();
+        let starts = in_other_forms(&fitted.structure.with(gain), &values).into_iter();
+        let compensated = starts.filter_map(|(structure, mut values)| {
+            let error = present / shown(&structure, &values) - 1.0;
+            *values.last_mut()? = error;
+            (error.abs() < 1.0).then_some((structure, values))
+        });
+        compensated.collect()
     }
 
     /// The model refitted with each effect that resembles the other in its other forms with the same parameters: a

@@ -64,6 +64,8 @@ pub struct NuisanceTerms {
     pub drift_half_waves: usize,
     /// Rates at which a state from before the record decays, per s.
     pub decays_per_s: Vec<f64>,
+    /// Modes that effects add, in which a state from before the record rings.
+    pub ringing: Vec<Mode>,
     /// Modes of the stand other than the plain stand's, with free motion from the record's start.
     pub modes: Vec<Mode>,
 }
@@ -74,6 +76,7 @@ impl NuisanceTerms {
         spikes_hz: None,
         drift_half_waves: 0,
         decays_per_s: Vec::new(),
+        ringing: Vec::new(),
         modes: Vec::new(),
     };
 
@@ -327,6 +330,11 @@ impl StandRecord {
             let step = rate_per_s / rate_hz;
             let decay = (0..count).map(|i| (-step * i as f64).exp());
             columns.push(self.weighted(decay.collect()));
+        }
+        for mode in terms.ringing.iter().filter(|m| self.has_free_motion(m)) {
+            for column in self.free_motion(mode) {
+                columns.push(column);
+            }
         }
         nuisance.lines = columns.count();
         for frequency_hz in &terms.lines_hz {

@@ -205,17 +205,20 @@ impl ScoredModel {
         self.used_for_comparison().count()
     }
 
-    /// Number of parameters, including amplitudes of lines, and their phases and the constant load on each training
-    /// record.
+    /// Number of parameters, including amplitudes of lines, and on each training record their phases, slow trends, what
+    /// remains of its history, and the constant load.
     pub fn parameter_count(&self) -> usize {
         let (model, terms) = self.fitted.structure.model(&self.fitted.values);
-        self.fitted.values.len()
-            + OwnOfRecords::preloaded(&model, self.train.records().len()).len()
-            + self.fitted.amplitudes.len()
-            + terms.lines_hz.len() * self.train.records().len()
-            + self.parameters_of_spikes()
+        let records = self.train.records().len();
+        let of_each = terms.lines_hz.len()
             + terms.drift_half_waves
             + terms.decays_per_s.len()
+            + 2 * terms.ringing.len();
+        self.fitted.values.len()
+            + OwnOfRecords::preloaded(&model, records).len()
+            + self.fitted.amplitudes.len()
+            + of_each * records
+            + self.parameters_of_spikes()
     }
 
     /// Number of parameters of the moments and shapes of spikes in the training records.

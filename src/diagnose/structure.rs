@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use torqcomp_model::effects::{Action, Effect, Fixed, Form, RecordScales, Stage, Unit};
+use torqcomp_model::effects::{Action, Effect, Fixed, Form, History, RecordScales, Stage, Unit};
 use torqcomp_model::{Chain, Link};
 use torqcomp_model::{ModalResponse, Mode};
 
@@ -350,9 +350,12 @@ impl Structure {
         }
         let mut links = Vec::new();
         for (effect, own) in self.effects.iter().zip(self.effect_values(values)) {
-            let corners = effect.form.parameters.iter().zip(&own);
-            let fading = corners.filter(|(p, _)| p.fades);
-            terms.decays_per_s.extend(fading.map(|(_, hz)| TAU * hz));
+            for (k, parameter) in effect.form.parameters.iter().enumerate() {
+                if parameter.history == History::Fades {
+                    terms.decays_per_s.push(TAU * own[k]);
+                }
+                terms.ringing.extend(parameter.ringing(&mode, &own[k..]));
+            }
             let link = Link::of(effect.effect, effect.form, &own);
             match &link.action {
                 Action::Lines(lines) => terms.lines_hz.extend(lines.iter().map(|l| l.frequency_hz)),

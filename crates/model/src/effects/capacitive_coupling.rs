@@ -6,7 +6,7 @@
 //! below the corner of the stray path** for the first two. Mistaken for `second-mode` below the excitation,
 //! `time-delay` of the other channel.
 
-use super::{Action, Effect, EffectParameter, Form, Stage};
+use super::{Action, Effect, EffectParameter, Form, History, Stage};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
@@ -71,7 +71,7 @@ pub(super) static EFFECT: Effect = Effect {
             stage: Stage::Chain,
             // Below this bound, a record of a thousand periods shows a slope instead of a corner,
             // which is a drift.
-            parameters: &[EffectParameter::frequency("corner", 1e-4, 3.0).fading()],
+            parameters: &[EffectParameter::frequency("corner", 1e-4, 3.0).showing(History::Fades)],
             starts: &[&[0.003], &[0.05], &[0.3]],
             build: |p| {
                 let corner = TAU * p[0];

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use super::{Action, Effect, EffectParameter, Form, Stage};
+use super::{Action, Effect, EffectParameter, Form, History, Stage};
 
 pub(super) static EFFECT: Effect = Effect {
     name: "gage-creep",
@@ -26,7 +26,7 @@ pub(super) static EFFECT: Effect = Effect {
         stage: Stage::Gage,
         parameters: &[
             EffectParameter::number("share", -0.5, 0.5),
-            EffectParameter::frequency("corner", 1e-4, 0.3).fading(),
+            EffectParameter::frequency("corner", 1e-4, 0.3).showing(History::Fades),
         ],
         starts: &[&[0.01, 0.001], &[0.01, 0.01], &[0.01, 0.1]],
         build: |p| {

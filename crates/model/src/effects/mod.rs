@@ -53,7 +53,7 @@ pub use action::{
 pub(crate) use backlash::bridge;
 pub use capacitive_coupling::level;
 pub use lines::{FoundLine, SpectralLine, subtract_lines};
-pub use parameter::{EffectParameter, ParameterScale, RecordScales, Unit};
+pub use parameter::{EffectParameter, History, ParameterScale, RecordScales, Unit};
 pub use rivals::RIVALS;
 pub use spike_search::{FoundTrain, SpikeSearch, find_trains, subtract_spikes};
 pub use spikes::{SpikeMoments, SpikeShape, SpikeTrain};

@@ -1,5 +1,9 @@
 //! Parameters of effects: units, physical bounds, and the scales that make them dimensionless.
 
+use std::f64::consts::TAU;
+
+use crate::mode::Mode;
+
 /// A parameter of an effect.
 #[derive(Debug)]
 pub struct EffectParameter {
@@ -15,11 +19,25 @@ pub struct EffectParameter {
     pub upper: f64,
     /// Whether a fit uses the reciprocal, so that zero means no effect.
     pub reciprocal: bool,
-    /// Whether it is a corner in Hz at which the history before a record decays: an unknown part of that history
-    /// belongs to the record.
-    pub fades: bool,
+    /// What it says of the history before a record.
+    pub history: History,
     /// Whether the effect degenerates to another one where this is zero.
     pub essential: bool,
+}
+
+/// What an effect shows of the history before a record: an unknown part of the record, which belongs to it rather than the
+/// stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum History {
+    /// Nothing that lasts.
+    Unseen,
+    /// It decays, at a corner in Hz.
+    Fades,
+    /// It rings, with a natural frequency in Hz and the damping ratio that is the next parameter.
+    Rings,
+    /// It rings in both modes of the stand coupled to an inertia, with that inertia's frequency in Hz, the damping ratio
+    /// that is the next parameter, and the inertia ratio that is the third.
+    RingsCoupled,
 }
 
 /// Unit of a parameter: recorded unit to a power, seconds to a power; or hertz.
@@ -81,7 +99,7 @@ impl EffectParameter {
             lower,
             upper,
             reciprocal: false,
-            fades: false,
+            history: History::Unseen,
             essential: false,
         }
     }
@@ -122,12 +140,24 @@ impl EffectParameter {
         }
     }
 
-    /// Marks it as a corner below the band at which the history before a record decays.
+    /// Sets what it says of the history before a record.
     #[must_use]
-    pub const fn fading(self) -> Self {
-        Self {
-            fades: true,
-            ..self
+    pub const fn showing(self, history: History) -> Self {
+        Self { history, ..self }
+    }
+
+    /// Modes in which the history before a record rings, from the stand's first mode and the values from this parameter
+    /// on.
+    #[must_use]
+    pub fn ringing(&self, first: &Mode, values: &[f64]) -> Vec<Mode> {
+        let own = || Mode {
+            omega_rad_s: TAU * values[0],
+            damping_ratio: values[1],
+        };
+        match self.history {
+            History::Unseen | History::Fades => Vec::new(),
+            History::Rings => vec![own()],
+            History::RingsCoupled => first.coupled_to(&own(), values[2]),
         }
     }
 

@@ -5,13 +5,14 @@
 //! **Valid for modes separated by more than their widths.** Mistaken for `recorder-lowpass` or `time-delay` if it lies
 //! above the excitation.
 
-use super::{Action, Effect, EffectParameter, Form, Mode, Stage};
+use super::{Action, Effect, EffectParameter, Form, History, Mode, Stage};
 use crate::modal::ModalResponse;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 /// A mode far above the band shows only as a slope, which has other causes.
-const FREQUENCY: EffectParameter = EffectParameter::frequency("frequency", 0.05, 20.0);
+const FREQUENCY: EffectParameter =
+    EffectParameter::frequency("frequency", 0.05, 20.0).showing(History::Rings);
 const DAMPING: EffectParameter = EffectParameter::number("damping_ratio", 1e-4, 1.0);
 const SHARE: EffectParameter = EffectParameter::number("share", -3.0, 3.0);
 
@@ -95,7 +96,7 @@ pub(super) static EFFECT: Effect = Effect {
             law: "a second inertia, mu times the first, coupled to it by a spring and a damper",
             stage: Stage::Dynamics,
             parameters: &[
-                FREQUENCY,
+                FREQUENCY.showing(History::RingsCoupled),
                 DAMPING,
                 EffectParameter::number("inertia_ratio", 0.0, 3.0),
             ],
