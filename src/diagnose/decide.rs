@@ -14,8 +14,9 @@ const TIED_SIGNIFICANCE: f64 = 2.33;
 /// another.
 const TIED_GAIN: f64 = 9.0;
 
-/// Ratio of the errors up to which an effect with fewer parameters counts as no worse than one that is not determined.
-const NEARLY: f64 = 1.05;
+/// Ratio of the errors up to which an effect with fewer parameters counts as no worse than one that is not determined, or
+/// that takes out noise on the applied quantity.
+pub const NEARLY: f64 = 1.05;
 
 /// Accepts the best of the candidates that are not rejected, and compares the others with it.
 pub fn decide(tried: &mut [CandidateFit], base: &BaseModel, records: &Records) {

@@ -1,10 +1,15 @@
 //! Exchange of effects: one that was found first may only resemble another, or two others, and be recognised once later
 //! effects are present.
 
+use std::cell::LazyCell;
+use std::cmp::Ordering;
+
 use torqcomp_model::effects::{EFFECTS, Effect, Form, Stage};
 
 use super::SearchState;
 use super::acceptance::refusal;
+use super::applied_noise::NoisierRecords;
+use super::decide::NEARLY;
 use super::fit::{FitEffort, fit};
 use super::pairs::best_pairs;
 use super::records::Records;
@@ -28,8 +33,7 @@ const FOR_EXCHANGE: SearchEffort = SearchEffort {
     full: 2,
     promising: 0.5,
 };
-/// Where only effects that resemble the present one are tried, so that each gets a full fit besides those with several
-/// forms.
+/// The same among those that resemble the present one, most of which have several forms.
 const AMONG_ALIKE: SearchEffort = SearchEffort {
     full: 6,
     ..FOR_EXCHANGE
@@ -58,7 +62,8 @@ impl SearchState {
     }
 
     /// The best model with one effect exchanged or refitted, if it is better than the current one, or as good and first
-    /// in the list. While a residual remains, any effect may replace it; otherwise only one that resembles it.
+    /// in the list; what only takes out noise on the applied quantity is no reason for more parameters. While a residual
+    /// remains, any effect may replace it; otherwise only one that resembles it.
     fn other_effects(
         &self,
         seen: &[Vec<&'static str>],
@@ -73,18 +78,25 @@ impl SearchState {
         }
         let silent = workers.silent();
         let without = self.after.without_each(&self.records, workers.threads);
+        let noisier = LazyCell::new(|| NoisierRecords::of(&self.records));
         let mut found = Vec::new();
         for (form, less) in present.iter().zip(without) {
             let Some(less) = less else { continue };
             let effect = form.effect;
             let base = BaseModel::of(less.clone(), &self.records);
-            let among = |e: &Effect| is_open || e.name == effect.name || effect.resembles(e);
-            let effort = if is_open { &FOR_EXCHANGE } else { &AMONG_ALIKE };
-            let round = try_effects(&base, among, effort, &self.records, silent);
+            let is_alike = |e: &Effect| e.name == effect.name || effect.resembles(e);
+            let round = try_effects(&base, is_alike, &AMONG_ALIKE, &self.records, silent);
+            let others = is_open.then(|| {
+                let among = |e: &Effect| !is_alike(e);
+                try_effects(&base, among, &FOR_EXCHANGE, &self.records, silent)
+            });
+            let tried = round.tried.into_iter();
+            let tried = tried.chain(others.into_iter().flat_map(|others| others.tried));
             let passes = |model: &ScoredModel| refusal(model, &less).is_none();
-            let singles = round.tried.into_iter().filter_map(|c| {
+            let singles = tried.filter_map(|c| {
                 let model = c.model.filter(passes)?;
-                self.is_better(&model, effect, c.effect).then_some(model)
+                self.is_better((&model, c.effect), effect, noisier.as_ref())
+                    .then_some(model)
             });
             found.extend(singles);
             let merged = less.in_other_forms(effect, &self.records, workers.threads);
@@ -108,10 +120,27 @@ impl SearchState {
     }
 
     /// Whether a model with one effect in place of another is better than the current one.
-    fn is_better(&self, model: &ScoredModel, present: &Effect, other: &Effect) -> bool {
+    fn is_better(
+        &self,
+        (model, other): (&ScoredModel, &Effect),
+        present: &Effect,
+        noisier: Option<&NoisierRecords>,
+    ) -> bool {
         let place = |effect: &Effect| EFFECTS.iter().position(|e| e.name == effect.name);
         let difference = model.criterion() - self.after.criterion();
-        difference < -SAME || difference < SAME && place(other) < place(present)
+        let is_better = difference < -SAME || difference < SAME && place(other) < place(present);
+        if other.name == present.name {
+            return is_better;
+        }
+        let is_only_noise = |less: &ScoredModel, more: &ScoredModel| {
+            let is_near = less.compared_rms() < NEARLY * more.compared_rms();
+            is_near && noisier.is_some_and(|noisier| !noisier.bear_out(less, more))
+        };
+        match model.parameter_count().cmp(&self.after.parameter_count()) {
+            Ordering::Less => is_better || is_only_noise(model, &self.after),
+            Ordering::Equal => is_better,
+            Ordering::Greater => is_better && !is_only_noise(&self.after, model),
+        }
     }
 }
 
