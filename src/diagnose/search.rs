@@ -89,6 +89,9 @@ const FULL_FIT: FitEffort = FitEffort::full(15);
 /// Maximum number of successive full fits, and ratio of successive sums of squares above which they end.
 const MOST_FULL_FITS: usize = 4;
 const FALLING: f64 = 0.9;
+/// Maximum sum of squares of a fit, relative to the best one, that is continued, and minimum relative reduction by that.
+const NEAR: f64 = 1.1;
+const NEARER: f64 = 1e-4;
 /// Initial fractions of the records for the first fits of a stand with several modes.
 const BEGINNINGS: [f64; 3] = [0.03, 0.1, 0.3];
 
@@ -319,7 +322,29 @@ pub fn fit_all(
     let promising = (fitted.train_sum, least);
     fit_special_cases(forms, &mut fits, promising, records, workers);
     fit_from_best(base, forms, &mut fits, records, workers);
+    fit_near_best(&mut fits, records, workers);
     fits
+}
+
+/// Continues the fits that are nearly as good as the best one, so that none loses because it has not converged.
+fn fit_near_best(fits: &mut [Option<ScoredModel>], records: &Records, workers: Workers) {
+    let sum =
+        |fit: &Option<ScoredModel>| fit.as_ref().map_or(f64::INFINITY, |m| m.fitted.train_sum);
+    let least = fits.iter().map(sum).fold(f64::INFINITY, f64::min);
+    let is_near = |k: &usize| (least * (1.0 + 1e-9)..NEAR * least).contains(&sum(&fits[*k]));
+    let near: Vec<usize> = (0..fits.len()).filter(is_near).collect();
+    let found = parallel(near.len(), workers.threads, |i| {
+        let model = fits[near[i]].as_ref()?;
+        let further = to_the_end(&model.fitted, records);
+        let is_less = further.train_sum < (1.0 - NEARER) * model.fitted.train_sum;
+        let scored = is_less.then(|| ScoredModel::of(further, records));
+        scored.flatten().map(ScoredModel::without_samples)
+    });
+    for (k, fit) in near.into_iter().zip(found) {
+        if fit.is_some() {
+            fits[k] = fit;
+        }
+    }
 }
 
 /// A fit continued while the error falls substantially: with light damping, small frequency errors accumulate, and
