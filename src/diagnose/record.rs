@@ -331,7 +331,9 @@ impl StandRecord {
             let decay = (0..count).map(|i| (-step * i as f64).exp());
             columns.push(self.weighted(decay.collect()));
         }
-        for mode in terms.ringing.iter().filter(|m| self.has_free_motion(m)) {
+        // A free decay shows no response to which a mode could be added, only its own modes.
+        let ringing = terms.ringing.iter().filter(|_| !self.is_free());
+        for mode in ringing.filter(|m| self.has_free_motion(m)) {
             for column in self.free_motion(mode) {
                 columns.push(column);
             }

@@ -210,14 +210,13 @@ impl ScoredModel {
     pub fn parameter_count(&self) -> usize {
         let (model, terms) = self.fitted.structure.model(&self.fitted.values);
         let records = self.train.records().len();
-        let of_each = terms.lines_hz.len()
-            + terms.drift_half_waves
-            + terms.decays_per_s.len()
-            + 2 * terms.ringing.len();
+        let driven = self.train.records().iter().filter(|r| !r.is_free());
+        let of_each = terms.lines_hz.len() + terms.drift_half_waves + terms.decays_per_s.len();
         self.fitted.values.len()
             + OwnOfRecords::preloaded(&model, records).len()
             + self.fitted.amplitudes.len()
             + of_each * records
+            + 2 * terms.ringing.len() * driven.count()
             + self.parameters_of_spikes()
     }
 
