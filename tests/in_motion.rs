@@ -216,7 +216,7 @@ fn plateaus(modes: [[f64; 3]; 2], seed: u64) -> Folder {
                 change * (step(modes[0], t - begins(k)) + step(modes[1], t - begins(k)))
             });
             let seen = response.sum::<f64>() + 0.5 * NOISE * noise.normal();
-            let applied = levels[so_far.last().expect("the first plateau")];
+            let applied = levels[so_far.count() - 1];
             text += &format!("{t:.4},{applied:.9},{seen:.9}\n");
         }
         folder.write(name, text);
