@@ -57,6 +57,10 @@ impl Mode {
             1.0 + c1 * c2 + (1.0 + mu) * k2,
             c1 + (1.0 + mu) * c2,
         ];
+        // The search for eigenvalues would not end.
+        if !powers.iter().all(|power| power.is_finite()) {
+            return Vec::new();
+        }
         let mut companion = Matrix4::zeros();
         for (k, power) in powers.into_iter().enumerate() {
             companion[(k, 3)] = -power;
