@@ -5,6 +5,7 @@
 //! twice the noise it falls by as much again, unlike for a real effect: as in simulation extrapolation (J. R. Cook, L.
 //! A. Stefanski, J. Am. Stat. Assoc. 89 (1994), 1314).
 
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 use torqcomp_model::simulate::Excitation;
@@ -23,9 +24,34 @@ const MOSTLY: f64 = 0.5;
 /// nonlinear model, which may have several motions for one input, does with further noise.
 const FAR_MORE: f64 = 10.0;
 
+/// Comparison of models on records with noise on their applied quantity.
+pub struct AppliedNoise<'a> {
+    records: &'a Records,
+    /// Made for the first comparison; `None` if the applied quantity has no detectable noise.
+    noisier: OnceCell<Option<NoisierRecords>>,
+}
+
+impl<'a> AppliedNoise<'a> {
+    pub fn of(records: &'a Records) -> Self {
+        Self {
+            records,
+            noisier: OnceCell::new(),
+        }
+    }
+
+    /// Whether a model explains more than another beyond removing the response to that noise.
+    pub fn bears_out(&self, before: &ScoredModel, after: &ScoredModel) -> bool {
+        let noisier = self
+            .noisier
+            .get_or_init(|| NoisierRecords::of(self.records));
+        let noisier = noisier.as_ref();
+        noisier.is_none_or(|noisier| noisier.bear_out(before, after))
+    }
+}
+
 /// Records for comparing models with the noise on their applied quantity doubled: once with further noise added, once
 /// with it subtracted, so that its products with the existing noise cancel.
-pub struct NoisierRecords {
+struct NoisierRecords {
     added: Vec<StandRecord>,
     taken_off: Vec<StandRecord>,
     /// Records whose input is the noise alone and whose measured quantity is zero.
@@ -36,7 +62,7 @@ pub struct NoisierRecords {
 
 impl NoisierRecords {
     /// `None` if the applied quantity has no detectable noise.
-    pub fn of(records: &Records) -> Option<Self> {
+    fn of(records: &Records) -> Option<Self> {
         let are_fitted = records.holdout.is_empty();
         let compared = match are_fitted {
             true => &records.train,
@@ -71,7 +97,7 @@ impl NoisierRecords {
     }
 
     /// Whether a model explains more than another beyond removing the response to noise on the applied quantity.
-    pub fn bear_out(&self, before: &ScoredModel, after: &ScoredModel) -> bool {
+    fn bear_out(&self, before: &ScoredModel, after: &ScoredModel) -> bool {
         let gain = after.against(before).gain();
         if gain > FAR_MORE * self.passed_by(before) {
             return true;

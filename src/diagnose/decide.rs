@@ -1,8 +1,6 @@
 //! Choice of the accepted candidate, and comparison of the others with it.
 
-use std::cell::LazyCell;
-
-use super::applied_noise::NoisierRecords;
+use super::applied_noise::AppliedNoise;
 use super::reason::Reason;
 use super::records::Records;
 use super::score::{BaseModel, ScoredModel};
@@ -20,16 +18,13 @@ pub const NEARLY: f64 = 1.05;
 
 /// Accepts the best of the candidates that are not rejected, and compares the others with it.
 pub fn decide(tried: &mut [CandidateFit], base: &BaseModel, records: &Records) {
-    let noisier = LazyCell::new(|| NoisierRecords::of(records));
+    let noise = AppliedNoise::of(records);
     let (chosen, tied) = loop {
         let Some((chosen, tied)) = choose(tried) else {
             return;
         };
         let model = tried[chosen].model.as_ref();
-        if model
-            .zip(noisier.as_ref())
-            .is_none_or(|(model, noisier)| noisier.bear_out(&base.scored, model))
-        {
+        if model.is_none_or(|model| noise.bears_out(&base.scored, model)) {
             break (chosen, tied);
         }
         tried[chosen].reason = Reason::TakesOutNoise;

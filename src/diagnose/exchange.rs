@@ -1,14 +1,13 @@
 //! Exchange of effects: one that was found first may only resemble another, or two others, and be recognised once later
 //! effects are present.
 
-use std::cell::LazyCell;
 use std::cmp::Ordering;
 
 use torqcomp_model::effects::{EFFECTS, Effect, Form, Stage};
 
 use super::SearchState;
 use super::acceptance::refusal;
-use super::applied_noise::NoisierRecords;
+use super::applied_noise::AppliedNoise;
 use super::decide::NEARLY;
 use super::fit::{FitEffort, fit};
 use super::pairs::best_pairs;
@@ -78,7 +77,7 @@ impl SearchState {
         }
         let silent = workers.silent();
         let without = self.after.without_each(&self.records, workers.threads);
-        let noisier = LazyCell::new(|| NoisierRecords::of(&self.records));
+        let noise = AppliedNoise::of(&self.records);
         let mut found = Vec::new();
         for (form, less) in present.iter().zip(without) {
             let Some(less) = less else { continue };
@@ -95,7 +94,7 @@ impl SearchState {
             let passes = |model: &ScoredModel| refusal(model, &less).is_none();
             let singles = tried.filter_map(|c| {
                 let model = c.model.filter(passes)?;
-                self.is_better((&model, c.effect), effect, noisier.as_ref())
+                self.is_better((&model, c.effect), effect, &noise)
                     .then_some(model)
             });
             found.extend(singles);
@@ -124,7 +123,7 @@ impl SearchState {
         &self,
         (model, other): (&ScoredModel, &Effect),
         present: &Effect,
-        noisier: Option<&NoisierRecords>,
+        noise: &AppliedNoise,
     ) -> bool {
         let place = |effect: &Effect| EFFECTS.iter().position(|e| e.name == effect.name);
         let difference = model.criterion() - self.after.criterion();
@@ -134,7 +133,7 @@ impl SearchState {
         }
         let is_only_noise = |less: &ScoredModel, more: &ScoredModel| {
             let is_near = less.compared_rms() < NEARLY * more.compared_rms();
-            is_near && noisier.is_some_and(|noisier| !noisier.bear_out(less, more))
+            is_near && !noise.bears_out(less, more)
         };
         match model.parameter_count().cmp(&self.after.parameter_count()) {
             Ordering::Less => is_better || is_only_noise(model, &self.after),
@@ -181,7 +180,7 @@ impl SearchState {
             k >= fitted.structure.declared && fitted.structure.effects[k].effect.name == GAIN
         };
         let (structure, values) = fitted.structure.reduced(&fitted.values, |k| !is_gain(k));
-        let starts = in_other_forms(&structure, &values);
+        let starts = in_other_stand_forms(&structure, &values);
         self.best_from(&starts, workers, |model| {
             model.criterion() < self.after.criterion() + SAME
         })
@@ -203,7 +202,7 @@ impl SearchState {
 }
 
 /// Structures in which one of the added effects of the stand has another form, and start values with the same stiffness.
-fn in_other_forms(structure: &Structure, values: &[f64]) -> Vec<(Structure, Vec<f64>)> {
+fn in_other_stand_forms(structure: &Structure, values: &[f64]) -> Vec<(Structure, Vec<f64>)> {
     let stiffness = |structure: &Structure, values: &[f64]| {
         let (chain, _) = structure.model(values);
         1.0 + chain.added_stiffness()
@@ -246,7 +245,7 @@ impl ScoredModel {
         };
         let present = shown(&fitted.structure, &fitted.values);
         let values = [&fitted.values[..], &[0.0]].concat();
-        let starts = in_other_forms(&fitted.structure.with(gain), &values).into_iter();
+        let starts = in_other_stand_forms(&fitted.structure.with(gain), &values).into_iter();
         let compensated = starts.filter_map(|(structure, mut values)| {
             let error = present / shown(&structure, &values) - 1.0;
             *values.last_mut()? = error;

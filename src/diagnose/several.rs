@@ -1,11 +1,9 @@
 //! From the plain stand to one with effects: singles, pairs, one after the other; unnecessary effects are removed, and
 //! guard models may contradict the remainder.
 
-use std::cell::LazyCell;
-
 use super::SearchState;
 use super::acceptance::{no_gain, refusal};
-use super::applied_noise::NoisierRecords;
+use super::applied_noise::AppliedNoise;
 use super::exchange::MANY;
 use super::guard_models::GuardModel;
 use super::noise_floor::NoiseFloorSource;
@@ -134,12 +132,7 @@ impl SearchState {
             return single.cloned().into_iter().collect();
         }
         let mut starts = best_pairs(base, &round.fits, &self.records, workers);
-        let noisier = LazyCell::new(|| NoisierRecords::of(&self.records));
-        let is_borne_out = |pair: &ScoredModel| {
-            noisier
-                .as_ref()
-                .is_none_or(|noisier| noisier.bear_out(model, pair))
-        };
+        let noise = AppliedNoise::of(&self.records);
         // Of two equivalent descriptions, the one with fewer parameters: a pair may replace an effect with many.
         let is_simpler = |pair: &ScoredModel| {
             pair.parameter_count() < model.parameter_count()
@@ -147,7 +140,7 @@ impl SearchState {
                 && refusal(pair, &self.before).is_none()
         };
         starts.retain(|pair| {
-            is_simpler(pair) || refusal(pair, model).is_none() && is_borne_out(pair)
+            is_simpler(pair) || refusal(pair, model).is_none() && noise.bears_out(model, pair)
         });
         if let Some(single) = single {
             // With the best effect all others are compared, including ties.
@@ -269,14 +262,12 @@ impl SearchState {
     /// The least needed effect, if its removal is not significant.
     fn needless(&self, without: &[Option<ScoredModel>]) -> Option<usize> {
         let (after, excess) = (&self.after, self.excess());
-        let noisier = LazyCell::new(|| NoisierRecords::of(&self.records));
+        let noise = AppliedNoise::of(&self.records);
         let is_needless = |less: &ScoredModel| {
             no_gain(after, less).is_some()
                 || after.criterion() >= less.criterion()
                 || excess.is_too_small(less, after)
-                || noisier
-                    .as_ref()
-                    .is_some_and(|noisier| !noisier.bear_out(less, after))
+                || !noise.bears_out(less, after)
         };
         let all = without.iter().enumerate();
         let models = all.filter_map(|(k, less)| Some((k, less.as_ref()?)));
