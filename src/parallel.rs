@@ -46,19 +46,22 @@ pub fn parallel<T: Send>(count: usize, threads: usize, run: impl Fn(usize) -> T 
     }
     let next = AtomicUsize::new(0);
     let results: Vec<Mutex<Option<T>>> = (0..count).map(|_| Mutex::new(None)).collect();
-    std::thread::scope(|scope| {
-        for _ in 0..threads.min(count) {
-            scope.spawn(|| {
-                loop {
-                    let job = next.fetch_add(1, Ordering::Relaxed);
-                    if job >= count {
-                        break;
-                    }
-                    let result = run(job);
-                    *results[job].lock().unwrap_or_else(|e| e.into_inner()) = Some(result);
-                }
-            });
+    let work = || {
+        loop {
+            let job = next.fetch_add(1, Ordering::Relaxed);
+            if job >= count {
+                break;
+            }
+            let result = run(job);
+            *results[job].lock().unwrap_or_else(|e| e.into_inner()) = Some(result);
         }
+    };
+    // This thread works, too: the memory that a thread has freed serves no other thread.
+    std::thread::scope(|scope| {
+        for _ in 1..threads.min(count) {
+            scope.spawn(work);
+        }
+        work();
     });
     results
         .into_iter()
