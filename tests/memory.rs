@@ -1,5 +1,6 @@
 //! Peak memory of the commands on records of two lengths: growth with the record, in bytes per row.
 
+use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::Stdio;
@@ -175,10 +176,14 @@ fn memory_grows_by_no_more_than_is_stated() {
     let refined = folder.read("stand.toml") + EFFECT;
     folder.write("refined.toml", refined);
     let mut wrong = String::new();
+    let mut written = HashSet::new();
     for (verb, channels, rows, most) in VERBS {
         let [short, long] = rows.map(|rows| {
-            folder.write("long.csv", record(rows, channels));
-            let line = verb.replace("LONG", "long.csv");
+            let name = format!("{}_{rows}.csv", channels.join("_"));
+            if written.insert(name.clone()) {
+                folder.write(&name, record(rows, channels));
+            }
+            let line = verb.replace("LONG", &name);
             peak_of(&folder, &line.split(' ').collect::<Vec<_>>())
         });
         let slope = (long - short) / (rows[1] - rows[0]) as f64;

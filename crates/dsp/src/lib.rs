@@ -22,7 +22,6 @@ pub mod compensate;
 pub mod conversion;
 pub mod curve;
 pub mod decimate;
-mod dot;
 mod error;
 pub mod frf;
 pub mod gage;
@@ -43,6 +42,6 @@ pub mod undersample;
 pub mod weak;
 pub mod zero_phase;
 
-pub use dot::{dot, rms};
 pub use error::Error;
 pub use order::sort_by_number;
+pub use torqcomp_fourier::{dot, rms};

@@ -209,7 +209,7 @@ mod tests {
     use super::*;
     use crate::band::Band;
     use crate::compensate::whole_record;
-    use crate::dot::rms;
+    use crate::rms;
     use crate::spectrum::welch;
 
     const RATE: f64 = 20_000.0;

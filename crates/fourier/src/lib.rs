@@ -1,15 +1,19 @@
-//! Fourier transforms of real records.
+//! Fourier transforms of real records, and sums of products.
 //!
 //! `X[k] = Σ x[n] e^{−2πi kn/N}` for `k = 0..=N/2` and its inverse, unscaled: a round trip multiplies by `N`.
 //!
 //! The planner of `rustfft` is generic, so every crate that uses it recompiles all of its kernels: 0.4 million lines of
 //! LLVM code. This crate is the only one to use it.
 
+mod dot;
+
 use std::sync::Arc;
 
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex64;
 pub use realfft::{ComplexToReal, RealToComplex};
+
+pub use dot::{dot, rms};
 
 /// The forward transform for records of one length, from samples to `length / 2 + 1` bins.
 ///

@@ -128,8 +128,10 @@ impl<'a> Cutting<'a, '_> {
             let line = stretch.strongest(samples, 0.0..f64::INFINITY);
             line.map(|line| 1.0 / line.frequency_hz)
         });
+        let mut periods_s: Vec<f64> = lines.into_iter().flatten().collect();
+        periods_s.dedup_by(|own, of_residual| (*own / *of_residual - 1.0).abs() < ALIKE);
         let mut moments = Vec::new();
-        for period_s in lines.into_iter().flatten() {
+        for period_s in periods_s {
             let mut times_s = jumps_s(stretch, period_s);
             if falls(residuals) {
                 times_s.extend(EARLY.map(|periods| periods * period_s));

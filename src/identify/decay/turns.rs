@@ -4,10 +4,8 @@ use num_complex::Complex64;
 
 use crate::identify::Pole;
 
-/// Minimum number of times for detecting a uniform grid; otherwise each costs a sine, a cosine and an
-/// exponential.
-const MANY: usize = 32_768;
-/// Number of successive multiplications of a phasor before rounding errors accumulate.
+/// Number of successive multiplications of a phasor on a uniform grid before rounding errors accumulate; elsewhere each
+/// phasor costs a sine, a cosine and an exponential.
 const BLOCK: usize = 64;
 /// Error of a phasor, in addition to the rounding of its time, up to which times count as uniform.
 const SAME: f64 = 1e-11;
@@ -21,21 +19,20 @@ pub(super) fn turns(times_s: &[f64], pole: Pole, mut each: impl FnMut(usize, Com
         let (sin, cos) = (exponent.im * time_s).sin_cos();
         (exponent.re * time_s).exp() * Complex64::new(cos, sin)
     };
-    let size = if times_s.len() < MANY { 1 } else { BLOCK };
-    for (block, times_s) in times_s.chunks(size).enumerate() {
+    for (block, times_s) in times_s.chunks(BLOCK).enumerate() {
         let (first, last) = (times_s[0], times_s[times_s.len() - 1]);
         let step_s = (last - first) / (times_s.len() - 1).max(1) as f64;
         let is_on_grid = |(k, time_s): (usize, &f64)| {
             let off_s = (time_s - first - k as f64 * step_s).abs() - ROUNDING * last.abs();
             off_s * exponent.norm() < SAME
         };
-        let is_uniform = size > 1 && times_s.iter().enumerate().all(is_on_grid);
+        let is_uniform = times_s.iter().enumerate().all(is_on_grid);
         let (mut turn, step) = (at(first), at(if is_uniform { step_s } else { 0.0 }));
         for (k, time_s) in times_s.iter().enumerate() {
             if !is_uniform {
                 turn = at(*time_s);
             }
-            each(block * size + k, turn);
+            each(block * BLOCK + k, turn);
             turn *= step;
         }
     }
@@ -55,7 +52,7 @@ mod tests {
         // Every thousandth stamp is late.
         let uneven = |i: usize| uniform(i) + if i % 1000 == 7 { 1e-5 } else { 0.0 };
         for time_s in [&uniform as &dyn Fn(usize) -> f64, &uneven] {
-            let times: Vec<f64> = (0..MANY + 100).map(time_s).collect();
+            let times: Vec<f64> = (0..32_868).map(time_s).collect();
             let mut seen = 0;
             turns(&times, pole, |i, turn| {
                 let t = times[i];

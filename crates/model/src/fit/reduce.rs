@@ -1,6 +1,7 @@
 //! Reduction of a tall least-squares problem to a small one without squaring its condition number.
 
 use nalgebra::{DMatrix, DVector};
+use torqcomp_fourier::dot;
 
 /// Rows per block: large enough for few rounds, small enough for the cache.
 const BLOCK: usize = 2048;
@@ -77,33 +78,26 @@ fn triangularize(matrix: &mut DMatrix<f64>) {
         if largest == 0.0 {
             continue;
         }
-        let norm = largest
-            * column
-                .iter()
-                .map(|x| (x / largest).powi(2))
-                .sum::<f64>()
-                .sqrt();
+        // Squares of large and small numbers would overflow and underflow.
+        let v = &mut v[..rows - k];
+        let both = v.iter_mut().zip(column.iter());
+        both.for_each(|(v, x)| *v = x / largest);
+        let norm = largest * dot(v, v).sqrt();
         let head = column[0];
         let alpha = if head > 0.0 { -norm } else { norm };
-        let v = &mut v[..rows - k];
-        // v is scaled to v₀ = 1, which avoids overflow.
+        // Scaled to v₀ = 1.
         let pivot = head - alpha;
+        let scale = largest / pivot;
+        v.iter_mut().for_each(|v| *v *= scale);
         v[0] = 1.0;
-        v[1..]
-            .iter_mut()
-            .zip(&column[1..])
-            .for_each(|(v, x)| *v = x / pivot);
         let beta = -pivot / alpha;
         column.fill(0.0);
         column[0] = alpha;
         for j in k + 1..columns {
             let target = &mut data[j * rows + k..(j + 1) * rows];
-            let dot: f64 = target.iter().zip(v.iter()).map(|(t, v)| t * v).sum();
-            let factor = beta * dot;
-            target
-                .iter_mut()
-                .zip(v.iter())
-                .for_each(|(t, v)| *t -= factor * v);
+            let factor = beta * dot(target, v);
+            let both = target.iter_mut().zip(v.iter());
+            both.for_each(|(t, v)| *t -= factor * v);
         }
     }
 }

@@ -4,7 +4,7 @@
 ///
 /// ```
 /// // 1·4 + 2·5 + 3·6
-/// assert_eq!(torqcomp_dsp::dot(&[1.0, 2.0, 3.0], &[4.0, 5.0, 6.0]), 32.0);
+/// assert_eq!(torqcomp_fourier::dot(&[1.0, 2.0, 3.0], &[4.0, 5.0, 6.0]), 32.0);
 /// ```
 #[must_use]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -25,7 +25,7 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 ///
 /// ```
 /// // (9 + 16)/2 = 12.5
-/// assert_eq!(torqcomp_dsp::rms(&[3.0, -4.0]), 12.5_f64.sqrt());
+/// assert_eq!(torqcomp_fourier::rms(&[3.0, -4.0]), 12.5_f64.sqrt());
 /// ```
 #[must_use]
 pub fn rms(values: &[f64]) -> f64 {
