@@ -567,3 +567,109 @@ fn milliseconds_beside_a_clock_of_seconds_are_their_parts() {
         .run(&[&COMPENSATE[..], &["--force"]].concat())
         .says(0, &["3000 samples at 1000 Hz"]);
 }
+
+/// Headings of words between spaces: the unit in brackets belongs to the word before it, and more words than columns name
+/// none of them, instead of the wrong ones.
+#[test]
+fn words_above_columns_between_spaces_name_their_own() {
+    let folder = Folder::new();
+    let rows: String = (0..200)
+        .map(|i| {
+            format!(
+                "{:.3} {} {} {}\n",
+                f64::from(i) * 1e-3,
+                100 + i % 7,
+                5 + i % 3,
+                1500
+            )
+        })
+        .collect();
+    let mean = |headings: &str, channel: &str, more: &[&str]| {
+        folder.write("in.txt", format!("{headings}\n{rows}"));
+        let args = [
+            "extract",
+            "in.txt",
+            "--channel",
+            channel,
+            "-o",
+            "out.csv",
+            "--force",
+        ];
+        let ran = folder.run(&[&args[..], more].concat());
+        let written = folder.read("out.csv");
+        let last = written
+            .lines()
+            .next()
+            .and_then(|line| line.split(',').nth(1).map(str::to_owned));
+        let heading = last.unwrap_or_default();
+        let values = column(&written, &heading);
+        (
+            ran,
+            heading,
+            values.iter().sum::<f64>() / values.len() as f64,
+        )
+    };
+    for headings in [
+        "Time [s] Force [N] Torque [N m] Speed [rpm]",
+        "# Time (s) Force (N) Torque (N m) Speed (rpm)",
+        "time_s Force[N] Torque [N m] Speed [rpm]",
+    ] {
+        let (ran, heading, mean) = mean(headings, "Torque", &[]);
+        ran.says(0, &["1000 Hz"]);
+        assert_eq!(heading, "Torque [N m]", "{headings}");
+        assert!((mean - 6.0).abs() < 0.01, "{headings}: {mean}");
+    }
+    let (ran, heading, mean) = mean(
+        "Time Motor Torque Input Speed",
+        "3",
+        &["--time-column", "1", "--time-unit", "s"],
+    );
+    ran.says(
+        0,
+        &[
+            "unassigned-headings",
+            "line 1 has more words than the 4 columns",
+        ],
+    );
+    assert!(heading.contains("column 4"), "{heading}");
+    assert!((mean - 1500.0).abs() < 0.01, "{mean}");
+    // A unit of time that contradicts the heading is said, as for a channel.
+    folder.write(
+        "in.txt",
+        format!("time_s,a_V,b_V,c_V\n{}", rows.replace(' ', ",")),
+    );
+    let args = ["extract", "in.txt", "--channel", "a", "--time-unit", "ms"];
+    folder
+        .run(&args)
+        .says(0, &["unit-overrides-heading", "--time-unit says ms"]);
+    // Stamps that nearly coincide, as of arrivals, make no values beyond the record's.
+    let rows: String = (0..400)
+        .map(|i| {
+            let late = [0.0, 0.0, 0.0, 0.49, -0.49, 0.0, 0.0][i % 7];
+            format!(
+                "{:.6},{:.6}\n",
+                1e-3 * (i as f64 + late),
+                (0.9 * i as f64).sin()
+            )
+        })
+        .collect();
+    folder.write("in.txt", format!("time_s,a_V\n{rows}"));
+    let args = [
+        "extract",
+        "in.txt",
+        "--channel",
+        "a",
+        "--resample",
+        "-o",
+        "out.csv",
+        "--force",
+    ];
+    folder.run(&args).says(
+        0,
+        &["resampled-uneven", "give --rate HZ instead of --resample"],
+    );
+    let largest = column(&folder.read("out.csv"), "a [V]")
+        .iter()
+        .fold(0.0_f64, |m, v| m.max(v.abs()));
+    assert!(largest < 1.5, "{largest}");
+}

@@ -229,6 +229,12 @@ pub(crate) fn resampled(
             print::rounded(done.longest_step_s, 4)
         );
     }
+    if done.uneven > 0 {
+        message += &format!(
+            "; interpolated by straight lines, as the stamps there nearly coincide: {}",
+            print::plural(done.uneven, "sample")
+        );
+    }
     if done.repeated > 0 {
         message += &format!(
             "; left out: {}",
@@ -241,6 +247,7 @@ pub(crate) fn resampled(
 /// Keeps the worst problems of resampling.
 fn note_worst(worst: &mut Resampled, done: &Resampled) {
     worst.gaps = worst.gaps.max(done.gaps);
+    worst.uneven = worst.uneven.max(done.uneven);
     worst.repeated = worst.repeated.max(done.repeated);
     worst.longest_step_s = worst.longest_step_s.max(done.longest_step_s);
     worst.largest_jitter = worst.largest_jitter.max(done.largest_jitter);

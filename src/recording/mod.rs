@@ -51,7 +51,7 @@ pub(crate) use room::MemoryNeed;
 pub(crate) use spool::Spool;
 pub(crate) use stamps::{COARSE_STAMPS, StampGrid, is_uniform, rates_of, same_stamps};
 pub(crate) use stream::ChannelStream;
-pub(crate) use uniform::{UniformRecord, UniformStream};
+pub(crate) use uniform::{UniformRecord, UniformStream, doubts};
 pub(crate) use validator::{StreamSummary, StreamValidator};
 
 /// A file's content.

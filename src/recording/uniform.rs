@@ -10,6 +10,8 @@ use super::stream::ChannelStream;
 use super::text::ChannelPlan;
 use super::validator::{StreamSummary, StreamValidator};
 use crate::failure::Failure;
+use crate::print::{plural, rounded};
+use crate::warning::Warning;
 
 /// A channel on a uniform time axis, block by block; interpolated if requested.
 pub(crate) struct UniformStream {
@@ -92,8 +94,34 @@ impl UniformStream {
         samples: &mut Vec<f64>,
     ) -> Result<(StreamSummary, Option<Resampled>), Failure> {
         let resampled = self.resampler.map(|resampler| resampler.finish(samples));
-        Ok((self.validator.finish(self.blocks.as_mut())?, resampled))
+        let mut summary = self.validator.finish(self.blocks.as_mut())?;
+        summary.warnings.extend(resampled.iter().flat_map(doubts));
+        Ok((summary, resampled))
     }
+}
+
+/// Warnings about samples that a resampling could only estimate.
+pub(crate) fn doubts(resampled: &Resampled) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    if resampled.gaps > 0 || resampled.repeated > 0 {
+        let message = format!(
+            "{} in the time stamps filled by linear interpolation ({}, longest step {} s), {} dropped",
+            plural(resampled.gaps, "gap"),
+            plural(resampled.bridged, "sample"),
+            rounded(resampled.longest_step_s, 4),
+            plural(resampled.repeated, "repeated time stamp")
+        );
+        warnings.push(Warning::new("resampled-gaps", message));
+    }
+    if resampled.uneven > 0 {
+        let message = format!(
+            "{} next to time stamps that nearly coincide, or are far from uniform, interpolated by straight lines; if the \
+             recorder sampled uniformly and these are times of arrival, give --rate HZ instead of --resample",
+            plural(resampled.uneven, "sample"),
+        );
+        warnings.push(Warning::new("resampled-uneven", message));
+    }
+    warnings
 }
 
 /// A uniformly sampled record, in SI units of the applied quantity, not yet compensated.

@@ -166,3 +166,27 @@ fn coarse_hits_are_used() {
         "{report}"
     );
 }
+
+/// A record that begins with a hit, or within one, shows neither the level at rest nor all of the force.
+#[test]
+fn a_hit_without_a_pretrigger_is_refused() {
+    let folder = Folder::new();
+    let rows = hit(180.0, 0.02, 4e-3, 0.02);
+    for (first, code) in [(101, 1), (100, 1), (80, 0)] {
+        let mut noise = Noise(3);
+        let rows = rows[first..].iter().enumerate().map(|(row, (force, x))| {
+            let (force, x) = (force + 1e-4 * noise.normal(), x + 1e-4 * noise.normal());
+            format!("{:.4},{force:.7},{x:.7}\n", row as f64 / RATE_HZ)
+        });
+        let rows: String = rows.collect();
+        folder.write("hit.csv", format!("time_s,force [N m],T [N m]\n{rows}"));
+        let verb = ["identify", "response", "hit.csv", "--modes", "1"];
+        let channels = ["--applied", "force", "--measured", "T"];
+        let ran = folder.run(&[&verb[..], &channels].concat());
+        assert_eq!(ran.code, code, "{first}: {}", ran.stderr);
+        let is_named = ran
+            .stderr
+            .contains("record from a few ms before the hit (pretrigger)");
+        assert_eq!(is_named, code == 1, "{first}: {}", ran.stderr);
+    }
+}

@@ -88,3 +88,79 @@ fn hits_that_follow_soon_are_used_and_named() {
         assert!((hz - 180.0).abs() < 0.1, "{apart_s} s: {hz} Hz");
     }
 }
+
+/// A torque of 10 N m switched on at each even time and off at each odd one, over 2 ms, and the signal in V of a stand of
+/// 180 Hz with a damping ratio of 0.02 and 0.134 V/(N m), in closed form.
+fn switched(times_s: &[f64], length_s: f64, seed: u64) -> (Vec<f64>, Vec<f64>) {
+    const RISE_S: f64 = 2e-3;
+    let (omega, ratio) = (TAU * 180.0, 0.02_f64);
+    let damped = omega * (1.0 - ratio * ratio).sqrt();
+    // Response to a torque that grows by 1 N m per s.
+    let ramp = |t: f64| match t > 0.0 {
+        true => {
+            let swing = 2.0 * ratio / omega * (damped * t).cos()
+                + (2.0 * ratio * ratio - 1.0) / damped * (damped * t).sin();
+            t - 2.0 * ratio / omega + (-ratio * omega * t).exp() * swing
+        }
+        false => 0.0,
+    };
+    let sum = |of: &dyn Fn(f64) -> f64| -> f64 {
+        let signs = times_s.iter().zip([1.0, -1.0].into_iter().cycle());
+        signs.map(|(at_s, sign)| sign * of(*at_s)).sum()
+    };
+    let mut noise = Noise(seed);
+    (0..(5000.0 * length_s) as usize)
+        .map(|i| {
+            let t = i as f64 / 5000.0;
+            let torque = sum(&|at_s| 10.0 * ((t - at_s) / RISE_S).clamp(0.0, 1.0));
+            let shown = sum(&|at_s| 10.0 / RISE_S * (ramp(t - at_s) - ramp(t - at_s - RISE_S)));
+            let torque = torque + 2e-3 * noise.normal();
+            (torque, 0.134 * shown + 2e-4 * noise.normal())
+        })
+        .unzip()
+}
+
+/// A square wave is the same half a period later with the other sign: it shows no delay of half a period, and no
+/// distortion.
+#[test]
+fn a_square_wave_has_the_sign_and_the_time_of_its_response() {
+    for seed in 1..4 {
+        let edges: Vec<f64> = (0..20).map(|k| 0.3 + 0.5 * f64::from(k)).collect();
+        let (applied, measured) = switched(&edges, 10.2, seed);
+        let record = response::Driven {
+            name: "square",
+            rate_hz: 5000.0,
+            applied: &applied,
+            measured: &measured,
+        };
+        let found = response::identify(&[record], &response::ResponseOptions::default()).unwrap();
+        let [gain, hz, ratio] = ["static_gain", "natural_frequency", "damping_ratio"]
+            .map(|name| of(&found, name).value());
+        assert!((gain / 0.134 - 1.0).abs() < 1e-3, "{seed}: {gain}");
+        assert!(
+            (hz - 180.0).abs() < 0.1 && (ratio - 0.02).abs() < 1e-3,
+            "{seed}: {hz}, {ratio}"
+        );
+        let all: Vec<&str> = found.warnings.iter().map(|warning| warning.code).collect();
+        assert!(
+            !all.contains(&"nonlinear") && !all.contains(&"channels-shifted"),
+            "{all:?}"
+        );
+    }
+}
+
+/// So does a torque that is switched on and off a few times, which is neither noise nor periodic.
+#[test]
+fn a_torque_that_comes_on_and_off_is_a_transient() {
+    for edges in [&[0.3, 1.1][..], &[0.3, 0.9, 1.9], &[0.3, 0.9, 1.7, 2.9]] {
+        let (applied, measured) = switched(edges, edges[edges.len() - 1] + 0.8, 5);
+        let found = one_mode(&applied, &measured, 5000.0);
+        let [gain, hz, ratio] = ["static_gain", "natural_frequency", "damping_ratio"]
+            .map(|name| of(&found, name).value());
+        assert!((gain / 0.134 - 1.0).abs() < 2e-3, "{edges:?}: {gain}");
+        assert!(
+            (hz - 180.0).abs() < 0.1 && (ratio - 0.02).abs() < 1e-3,
+            "{edges:?}: {hz}, {ratio}"
+        );
+    }
+}

@@ -440,6 +440,44 @@ fn a_run_with_a_fault_is_named() {
     has(&run(speed, |t| torque(t).clamp(-0.7, 0.7)), "clipped");
 }
 
+/// A PLC at 20 Hz, and a body that reverses every half second: friction was silently 21 standard uncertainties off.
+#[test]
+fn reversals_between_few_samples_are_refused() {
+    let (a, b) = (TAU * 0.5, TAU * 1.3);
+    let mut noise = Noise(1);
+    for (rate_hz, code, named) in [
+        (20.0, 1, "the body reverses about every"),
+        (60.0, 0, "few-samples-per-swing"),
+        (200.0, 0, ""),
+    ] {
+        let row = |i: usize| {
+            let t = i as f64 / rate_hz;
+            let speed = 30.0 * (a * t).sin() + 10.0 * (b * t).sin();
+            let gain = 30.0 * a * (a * t).cos() + 10.0 * b * (b * t).cos();
+            let torque = 0.01 * gain + 0.002 * speed + 0.05 * speed.signum();
+            (
+                speed + 0.02 * noise.normal(),
+                torque + 0.002 * noise.normal(),
+            )
+        };
+        let folder = Folder::new();
+        let rows = table(
+            ["w [rad/s]", "T [N m]"],
+            (0..(60.0 * rate_hz) as usize).map(row),
+        );
+        folder.write("run.csv", rows);
+        let rate = format!("{rate_hz}");
+        let verb = ["identify", "runup", "run.csv", "--rate", &rate];
+        let ran = folder.run(&[&verb[..], &["--motion", "w", "--torque", "T"]].concat());
+        ran.says(code, &[named]);
+        assert!(
+            rate_hz < 100.0 || !ran.stderr.contains("few-samples"),
+            "{}",
+            ran.stderr
+        );
+    }
+}
+
 fn loaded(rows: &[(f64, f64)], columns: [&str; 2]) -> Value {
     let folder = Folder::new();
     folder.write("in.csv", table(columns, rows.iter().copied()));

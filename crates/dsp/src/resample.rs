@@ -9,6 +9,9 @@ use crate::Error;
 
 /// Number of interpolation points where the stamps are close enough.
 const POINTS: usize = 8;
+/// Largest sum of the magnitudes of a polynomial's weights: more would amplify noise, jitter of the stamps and whatever lies
+/// between the samples. Through eight points at equal steps it is at most 2.1 in the middle.
+const LARGEST_SUM: f64 = 4.0;
 /// Longest step, in grid steps, that is interpolated by a polynomial; anything longer is a gap.
 const LONGEST_STEP: f64 = 1.5;
 /// Longest gap that is bridged, in grid steps.
@@ -34,6 +37,8 @@ pub struct Resampled {
     pub gaps: usize,
     /// Grid samples that lie within such gaps.
     pub bridged: usize,
+    /// Grid samples next to stamps too close together for a polynomial, interpolated by a straight line.
+    pub uneven: usize,
     /// Longest step of the stamps, in seconds.
     pub longest_step_s: f64,
     /// Largest distance of a stamp from the uniform step, as a fraction of the step, gaps aside.
@@ -57,7 +62,7 @@ pub struct BridgedGap {
 /// Interpolates stamped samples on the grid `t₀ + k Δt`, `t₀` being the first stamp.
 ///
 /// Between close stamps the polynomial through the eight nearest points is used (four on each side,
-/// Lagrange interpolation), across a gap a straight line. Streaming: results are output as soon as
+/// Lagrange interpolation), across a gap and next to stamps that nearly coincide a straight line. Streaming: results are output as soon as
 /// the points after them are available.
 #[derive(Debug)]
 pub struct Resampler {
@@ -237,8 +242,11 @@ impl Resampler {
         } else if self.is_gap(after) {
             self.done.bridged += 1;
             self.line(after, time_s)
+        } else if let Some(value) = self.polynomial(after, time_s) {
+            value
         } else {
-            self.polynomial(after, time_s)
+            self.done.uneven += 1;
+            self.line(after, time_s)
         };
         out.push(value);
         self.next += 1;
@@ -261,8 +269,8 @@ impl Resampler {
         x0 + (x1 - x0) * (time_s - t0) / (t1 - t0)
     }
 
-    /// Lagrange polynomial through up to four points on either side not separated by a gap.
-    fn polynomial(&self, after: usize, time_s: f64) -> f64 {
+    /// Lagrange polynomial through up to four points on either side not separated by a gap; `None` if they are too uneven.
+    fn polynomial(&self, after: usize, time_s: f64) -> Option<f64> {
         let mut first = after - 1;
         while first > 0 && after - first < POINTS / 2 && !self.is_gap(first) {
             first -= 1;
@@ -275,19 +283,16 @@ impl Resampler {
             last += 1;
         }
         let nodes: Vec<(f64, f64)> = self.points.range(first..=last).copied().collect();
-        nodes
-            .iter()
-            .enumerate()
-            .map(|(i, (ti, xi))| {
-                let weight: f64 = nodes
-                    .iter()
-                    .enumerate()
-                    .filter(|(j, _)| *j != i)
-                    .map(|(_, (tj, _))| (time_s - tj) / (ti - tj))
-                    .product();
-                xi * weight
-            })
-            .sum()
+        let (mut value, mut sum) = (0.0, 0.0);
+        for (i, (ti, xi)) in nodes.iter().enumerate() {
+            let others = nodes.iter().enumerate().filter(|(j, _)| *j != i);
+            let weight: f64 = others
+                .map(|(_, (tj, _))| (time_s - tj) / (ti - tj))
+                .product();
+            value += xi * weight;
+            sum += weight.abs();
+        }
+        (sum <= LARGEST_SUM).then_some(value)
     }
 }
 
@@ -324,6 +329,16 @@ mod tests {
             let want = signal(stamps[0] + 1e-3 * k as f64);
             assert!((x - want).abs() < bound, "{k}: {x} {want}");
         }
+    }
+
+    #[test]
+    fn stamps_that_nearly_coincide_amplify_nothing() {
+        let stamps: Vec<f64> = (0..400)
+            .map(|i| f64::from(i) + [0.0, 0.0, 0.0, 0.49, -0.49, 0.0, 0.0][i as usize % 7])
+            .collect();
+        let (out, done) = resample(&stamps, |t| (0.9 * t).sin(), 1.0);
+        assert!(out.iter().all(|x| x.abs() <= 1.2), "{out:?}");
+        assert!(done.uneven > 50 && done.gaps == 0, "{done:?}");
     }
 
     #[test]

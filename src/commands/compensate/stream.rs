@@ -23,7 +23,7 @@ use crate::failure::Failure;
 use crate::pipeline::{self, Stages};
 use crate::quality::excerpt;
 use crate::recording::moment::Moment;
-use crate::recording::{Block, StampGrid, StreamValidator};
+use crate::recording::{Block, StampGrid, StreamValidator, doubts};
 
 /// Number of jobs in addition to one per thread.
 const SPARE_JOBS: usize = 2;
@@ -129,8 +129,12 @@ pub(super) fn run(
     report.samples = joiner.samples;
     report.resampled = joiner.resampled;
     gathered.tell(&steps, &filter, report);
+    let mut summary = validator.finish(blocks.as_mut())?;
+    summary
+        .warnings
+        .extend(report.resampled.iter().flat_map(doubts));
     Ok(Seen {
-        summary: validator.finish(blocks.as_mut())?,
+        summary,
         excerpt: gathered.first,
         faults: gathered.faults.finish(),
     })

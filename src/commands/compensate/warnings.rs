@@ -2,14 +2,13 @@
 
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::quality::resonance::other_resonance;
-use torqcomp_dsp::resample::Resampled;
 use torqcomp_model::Mode;
 
 use super::Seen;
 use super::plot::Traces;
 use super::report::CompensateReport;
 use crate::inverse::ChainInverse;
-use crate::print::{plural, rounded, short};
+use crate::print::{rounded, short};
 use crate::quality::excerpt;
 use crate::stand::{Stand, off_rated};
 use crate::warning::Warning;
@@ -45,7 +44,6 @@ pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Tr
     if traces.is_some_and(Traces::is_empty) {
         more.push(empty_plot(report));
     }
-    more.extend(report.resampled.as_ref().and_then(of_gaps));
     more.extend(of_length(report));
     report.warnings.extend(more);
 }
@@ -259,19 +257,4 @@ fn of_noise(noise: &RecordNoise, report: &CompensateReport) -> Vec<Warning> {
         ));
     }
     warnings
-}
-
-fn of_gaps(resampled: &Resampled) -> Option<Warning> {
-    (resampled.gaps > 0 || resampled.repeated > 0).then(|| {
-        Warning::new(
-            "resampled-gaps",
-            format!(
-                "{} in the time stamps filled by linear interpolation ({}, longest step {} s), {} dropped",
-                plural(resampled.gaps, "gap"),
-                plural(resampled.bridged, "sample"),
-                rounded(resampled.longest_step_s, 4),
-                plural(resampled.repeated, "repeated time stamp")
-            ),
-        )
-    })
 }

@@ -11,7 +11,7 @@ const AT_REST: f64 = 0.95;
 
 /// The kind of excitation that a signal shows.
 pub(super) fn guess(applied: &[f64]) -> Excitation {
-    if is_of_two_levels(applied) {
+    if is_of_two_levels(applied) || is_switched(applied) {
         return Excitation::Transient;
     }
     let largest = applied.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
@@ -67,4 +67,31 @@ fn is_of_two_levels(samples: &[f64]) -> bool {
     let (first, rest) = samples.split_at(middle);
     let at_levels = first.len() + rest.iter().filter(|v| near(v, to)).count();
     at_levels as f64 > AT_LEVELS * samples.len() as f64
+}
+
+/// Maximum number of changes between two levels that are a single transient rather than a signal of its own.
+const MOST_CHANGES: usize = 8;
+
+/// Whether a signal is switched between two levels a few times.
+fn is_switched(samples: &[f64]) -> bool {
+    let count = (samples.len() / SHORT_END).max(1);
+    let from = mean(&samples[..count]);
+    let range = samples.iter().fold(0.0_f64, |m, v| m.max((v - from).abs()));
+    let is_far = |v: &&f64| (**v - from).abs() > 0.5 * range;
+    let far: Vec<f64> = samples.iter().filter(is_far).copied().collect();
+    if far.is_empty() {
+        return false;
+    }
+    let to = mean(&far);
+    let near = |v: &f64, level: f64| (v - level).abs() < STEADY * (to - from).abs();
+    let level = |v: &f64| match (near(v, from), near(v, to)) {
+        (false, false) => None,
+        (_, is_other) => Some(is_other),
+    };
+    let levels: Vec<bool> = samples.iter().filter_map(level).collect();
+    let changes = levels.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    let others = levels.iter().filter(|is_other| **is_other).count();
+    levels.len() as f64 > AT_LEVELS * samples.len() as f64
+        && others as f64 > (1.0 - AT_LEVELS) * samples.len() as f64
+        && (1..=MOST_CHANGES).contains(&changes)
 }

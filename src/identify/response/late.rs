@@ -1,6 +1,7 @@
 //! A channel that lags the other by so much that no fit of a delay can start from zero: from a quarter of a period of the
 //! strongest line on, as with two recorders.
 
+use std::cmp::Ordering;
 use std::f64::consts::PI;
 
 use num_complex::Complex64;
@@ -16,8 +17,8 @@ use crate::identify::{Identification, NamedEstimate};
 const BEGINS: f64 = 0.5;
 /// Lag in periods of the strongest line from which the channels are aligned first.
 const PERIODS: f64 = 0.25;
-/// Residual of the aligned records over that of the records as they are, up to which the aligned ones are taken if they
-/// have no more modes.
+/// Ratio of residuals up to which they are equal. A lag is believed if it saves modes with an equal residual, or gives a
+/// smaller one: a square wave is the same half a period later with the other sign.
 const AS_GOOD: f64 = 1.02;
 
 /// Samples by which the measured channel lags, negative if it leads; 0 for less than a fit of a delay finds.
@@ -96,8 +97,11 @@ pub(super) fn better(
     let left =
         |found: &Identification| found.fit.as_ref().map_or(f64::INFINITY, |fit| fit.relative);
     let is_better = as_recorded.as_ref().map_or(true, |as_recorded| {
-        aligned.modes.len() <= as_recorded.modes.len()
-            && left(&aligned) <= AS_GOOD * left(as_recorded)
+        match aligned.modes.len().cmp(&as_recorded.modes.len()) {
+            Ordering::Less => left(&aligned) <= AS_GOOD * left(as_recorded),
+            Ordering::Equal => AS_GOOD * left(&aligned) <= left(as_recorded),
+            Ordering::Greater => false,
+        }
     });
     if !is_better {
         return as_recorded;

@@ -2,6 +2,9 @@
 
 use super::{FreeRun, LEAST_WINDOWS, SHORTEST_HALF};
 use crate::failure::{ErrorCode, Failure};
+use crate::identify::{Motion, rms};
+use crate::print::{rounded, short};
+use torqcomp_dsp::quality::median;
 
 /// Rejects records that are too short, have gaps, or are constant.
 pub(super) fn check(run: &FreeRun) -> Result<(), Failure> {
@@ -46,4 +49,66 @@ pub(super) fn check(run: &FreeRun) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+/// Part of the rms speed that counts as motion in a direction.
+const MOVES: f64 = 0.1;
+/// Minimum number of samples between reversals: the shortest window, twice.
+const LEAST_SWING: usize = 4 * SHORTEST_HALF;
+/// Number from which the speed is resolved well.
+const GOOD_SWING: usize = 2 * LEAST_SWING;
+/// Minimum number of reversals with a typical distance.
+const REVERSALS: usize = 3;
+
+/// Median number of samples between reversals, if there are some and they are known.
+pub(super) fn samples_per_swing(run: &FreeRun) -> Option<usize> {
+    let speed = match run.kind {
+        Motion::Speed => run.motion.to_vec(),
+        Motion::Displacement => run
+            .motion
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .collect(),
+        Motion::Acceleration => return None,
+    };
+    let least = MOVES * rms(&speed);
+    let moving = speed.iter().enumerate().filter(|(_, v)| v.abs() > least);
+    let moving: Vec<(usize, bool)> = moving.map(|(i, v)| (i, *v > 0.0)).collect();
+    let turns = moving.windows(2).filter(|pair| pair[0].1 != pair[1].1);
+    let turns: Vec<usize> = turns.map(|pair| pair[1].0).collect();
+    let mut swings: Vec<f64> = turns
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]) as f64)
+        .collect();
+    match swings.len() + 1 >= REVERSALS {
+        true => median(&mut swings).map(|median| median as usize),
+        false => None,
+    }
+}
+
+/// Rejects runs that reverse within so few samples that the averages span several reversals.
+pub(super) fn swings(run: &FreeRun) -> Result<(), Failure> {
+    match samples_per_swing(run).filter(|samples| *samples < LEAST_SWING) {
+        None => Ok(()),
+        Some(samples) => Err(Failure::failed(
+            ErrorCode::UnsuitableRecord,
+            few(run, samples),
+        )),
+    }
+}
+
+/// What is wrong with few samples per swing.
+fn few(run: &FreeRun, samples: usize) -> String {
+    format!(
+        "the body reverses about every {samples} samples, which does not show when, so that dry and viscous friction cannot be \
+         told apart; record at {} Hz or more instead of {} Hz, or reverse less often",
+        rounded(run.rate_hz * GOOD_SWING as f64 / samples as f64, 2),
+        short(run.rate_hz)
+    )
+}
+
+/// A warning if the reversals of a run are barely resolved.
+pub(super) fn few_samples_per_swing(run: &FreeRun) -> Option<String> {
+    let samples = samples_per_swing(run).filter(|samples| *samples < GOOD_SWING)?;
+    Some(few(run, samples))
 }

@@ -101,6 +101,7 @@ pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification,
         motion: &motion,
         ..*run
     };
+    check::swings(run)?;
     let directions = Directions::of(run)?;
     let split = options.by_direction && directions.both();
     let half = match options.half_window_s {

@@ -1,5 +1,6 @@
 //! Names, method, charts and warnings of a run-up.
 
+use super::check;
 use super::directions::Directions;
 use super::resolution::too_few;
 use super::windows::FittedRows;
@@ -104,8 +105,8 @@ pub(super) fn warnings(
     if run.kind == Motion::Acceleration {
         result.warn(
             "speed-unknown",
-            "an acceleration gives the speed only up to a constant, so the offset includes dry friction and part of \
-             the viscous friction; record position or speed to separate them",
+            "an acceleration gives the speed only up to a constant: dry friction counts as viscous friction, which is \
+             too large then, and the offset includes a part of both; record position or speed to separate them",
         );
     } else if !directions.both() {
         result.warn(
@@ -120,6 +121,9 @@ pub(super) fn warnings(
             "dry friction that differs by direction cannot be distinguished from a torque offset: if the torque has no \
              offset, dry_friction ± offset is the dry friction in each direction",
         );
+    }
+    if let Some(message) = check::few_samples_per_swing(run) {
+        result.warn("few-samples-per-swing", message);
     }
     coarse(result, run, directions, fitted);
     if fitted.fit.noise_share > NOISY {

@@ -128,8 +128,10 @@ pub struct Periodic {
     pub excited: Vec<bool>,
 }
 
-/// Minimum amplitude of an excited line, relative to the strongest.
-const EXCITED: f64 = 1e-2;
+/// Minimum power of an excited line relative to that of its noise: by chance once in 10^11 lines.
+const EXCITED: f64 = 25.0;
+/// Minimum amplitude of an excited line, relative to the strongest, below which distortion of the source may explain it.
+const LEAST: f64 = 1e-4;
 
 /// Averages whole periods (J. Schoukens, R. Pintelon, Y. Rolain, Mastering System Identification in 100 Exercises,
 /// 2012, 5.2): differences between periods are noise, power of the mean at lines that are not excited is
@@ -148,23 +150,18 @@ pub fn average_periods(periods: &[Block]) -> Option<Periodic> {
         applied: mean_of(|b| &b.applied),
         measured: mean_of(|b| &b.measured),
     };
-    let scatter = |k: usize| -> f64 {
-        periods
-            .iter()
-            .map(|b| (b.measured[k] - mean.measured[k]).norm_sqr())
-            .sum()
+    let noise_of = |pick: fn(&Block) -> &Vec<Complex64>, k: usize| -> f64 {
+        let of = |b| (pick(b)[k] - pick(&mean)[k]).norm_sqr();
+        periods.iter().map(of).sum::<f64>() / (count * (count - 1)) as f64
     };
-    let noise_power = (0..lines)
-        .map(|k| scatter(k) / (count * (count - 1)) as f64)
-        .collect();
+    let noise_power = (0..lines).map(|k| noise_of(|b| &b.measured, k)).collect();
     let top = mean.applied[1..]
         .iter()
         .fold(0.0_f64, |m, x| m.max(x.norm()));
-    let excited = mean
-        .applied
-        .iter()
-        .map(|x| x.norm() >= EXCITED * top)
-        .collect();
+    let applied_noise: f64 = (1..lines).map(|k| noise_of(|b| &b.applied, k)).sum();
+    let typical = EXCITED * applied_noise / (lines - 1).max(1) as f64;
+    let is_excited = |x: &Complex64| x.norm() >= LEAST * top && x.norm_sqr() > typical;
+    let excited = mean.applied.iter().map(is_excited).collect();
     Some(Periodic {
         mean,
         noise_power,

@@ -34,6 +34,8 @@ pub enum HitFault {
     CutShort,
     /// The next hit follows soon.
     TooSoon,
+    /// The record begins with the hit, or within it.
+    NoRest,
 }
 
 impl fmt::Display for HitFault {
@@ -44,6 +46,10 @@ impl fmt::Display for HitFault {
             Self::CutShort => "the record ends soon after it",
             Self::TooSoon => {
                 "the next hit follows before the response has lasted as long as that of others"
+            }
+            Self::NoRest => {
+                "the record begins within it or just before, so that the level at rest, or a part of the force, is \
+                 missing; record from a few ms before the hit (pretrigger)"
             }
         })
     }
@@ -56,8 +62,9 @@ const STRONG: f64 = 0.3;
 const SECOND: f64 = 0.05;
 /// Smallest force of a second stroke, in standard deviations of the force at rest.
 const ABOVE_NOISE: f64 = 8.0;
-/// Samples kept before the rise of the force.
+/// Samples kept before the rise of the force, and the least number of them that shows the level at rest.
 const BEFORE: usize = 16;
+const AT_REST: usize = 8;
 
 /// Finds the hits. A second stroke within `apart` samples belongs to the first hit; later ones are separate hits.
 #[must_use]
@@ -71,8 +78,11 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
     let all = peaks(&size, force.len(), largest, apart);
     let mut peaks: Vec<usize> = Vec::new();
     let mut starts: Vec<usize> = Vec::new();
+    let mut begins_with_hit = false;
     for peak in all {
-        let start = start_of(&size, peak, largest);
+        let rise = rise_of(&size, peak, largest);
+        begins_with_hit |= rise < AT_REST && starts.is_empty();
+        let start = rise.saturating_sub(BEFORE);
         // A response that is still ringing belongs to the preceding hit.
         if starts
             .last()
@@ -94,6 +104,9 @@ pub fn find_hits(force: &[f64], measured: &[f64], apart: usize) -> Vec<Hit> {
             let mut faults = faults([force, measured], grains, rest, peaks[k], range.clone());
             let second = (SECOND * size(peaks[k])).max(ABOVE_NOISE * noise);
             let second = second_stroke(&size, peaks[k], range.end, second);
+            if k == 0 && begins_with_hit {
+                faults.push(HitFault::NoRest);
+            }
             if range.len() < enough {
                 faults.push(match is_last {
                     true => HitFault::CutShort,
@@ -208,13 +221,10 @@ fn faults(
     faults
 }
 
-/// Start of the pulse with this peak.
-fn start_of(size: &impl Fn(usize) -> f64, peak: usize, largest: f64) -> usize {
-    let quiet = (0..peak)
-        .rev()
-        .find(|i| size(*i) < 0.02 * largest)
-        .unwrap_or(0);
-    quiet.saturating_sub(BEFORE)
+/// Last sample before the pulse with this peak; the first of the record if it begins within it.
+fn rise_of(size: &impl Fn(usize) -> f64, peak: usize, largest: f64) -> usize {
+    let mut before = (0..peak).rev();
+    before.find(|i| size(*i) < 0.02 * largest).unwrap_or(0)
 }
 
 /// Standard deviation of the noise in a mostly slow signal, from its second differences.

@@ -1,7 +1,9 @@
 //! Columns named like time whose values are not used as such.
 
 use super::groups::Group;
+use super::stamps::StampRule;
 use super::{AxisRule, Sources};
+use crate::recording::text::units;
 use crate::warning::Warning;
 
 /// Minimum number of rows for comparing two time columns.
@@ -23,6 +25,19 @@ impl Sources<'_> {
                 self.fields[*place].heading
             ),
         ))
+    }
+
+    /// A warning if --time-unit contradicts the heading of the time.
+    pub(super) fn overridden_unit(&self, rule: &StampRule) -> Option<Warning> {
+        let given = self.reading.time_unit.as_ref()?;
+        let field = &self.fields[rule.place];
+        let named = field.unit.as_ref().filter(|named| units::is_time(named))?;
+        let differs = (named.unit.factor() / rule.seconds_per_unit - 1.0).abs() > 1e-9;
+        let message = format!(
+            "\"{}\" says {}, --time-unit says {given}; {given} was used",
+            field.heading, named.text
+        );
+        differs.then(|| Warning::new("unit-overrides-heading", message))
     }
 
     /// Warnings about numeric columns that were left out because of their names, but differ from the

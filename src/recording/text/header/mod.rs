@@ -24,6 +24,8 @@ pub struct Header {
     pub entries: Vec<Entry>,
     /// Text of the line with the names.
     pub names: Option<String>,
+    /// Number of a line just above the table with more words than there are columns, none of which has a name then.
+    pub unassigned: Option<usize>,
 }
 
 impl Header {
@@ -87,9 +89,15 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
             fields,
             entries,
             names: Some(head.lines[names].text.clone()),
+            unassigned: None,
         };
     }
     let found = positional(&rows, table, used);
+    let unassigned = rows
+        .last()
+        .filter(|row| found.names.is_none() && row.line + 1 == table.first)
+        .filter(|row| is_split_at_words(&row.cells, table) && keys::topic(row.text).is_none())
+        .map(|row| head.number(row.line));
     let mut fields = found.fields;
     let mut entries = entries(&found.lines);
     entries.extend(fill_from_list(&mut fields, &rows));
@@ -103,6 +111,7 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
         fields,
         entries,
         names: found.names.map(|line| head.lines[line].text.clone()),
+        unassigned,
     }
 }
 
@@ -161,10 +170,14 @@ fn split(text: &str, table: &Table, used: &[bool]) -> Vec<String> {
     let cells = table.dialect.cells(text);
     let count = |cells: &[String]| cells.iter().filter(|cell| !cell.is_empty()).count();
     let wanted = used.iter().filter(|used| **used).count();
-    if count(&cells) >= wanted && cells.len() <= table.width + 1 || wanted < 2 {
+    let is_split = is_split_at_words(&cells, table);
+    if count(&cells) >= wanted && cells.len() <= table.width + 1 && !is_split || wanted < 2 {
         return cells;
     }
     if let Some(joined) = in_threes(&cells, table.width) {
+        return joined;
+    }
+    if let Some(joined) = with_their_units(&cells).filter(|cells| cells.len() == table.width) {
         return joined;
     }
     let others = [b'\t', b';', b',', b'|'];
@@ -194,6 +207,30 @@ fn split(text: &str, table: &Table, used: &[bool]) -> Vec<String> {
     ways.into_iter()
         .find(|way| way.len() == table.width)
         .unwrap_or(cells)
+}
+
+/// Whether a line above a table that is separated by spaces has more words than the table has columns, so that none of them
+/// can be assigned to a column.
+fn is_split_at_words(cells: &[String], table: &Table) -> bool {
+    table.dialect.delimiter == Delimiter::Spaces && cells.len() > table.width
+}
+
+/// Words with the units in brackets that follow them, `Torque [N m]`, if there are any.
+fn with_their_units(words: &[String]) -> Option<Vec<String>> {
+    let mut cells: Vec<String> = Vec::new();
+    let mut closing = None;
+    for word in words {
+        let opening = [('[', ']'), ('(', ')')]
+            .into_iter()
+            .find(|(open, _)| word.starts_with(*open));
+        closing = closing.or(opening.map(|(_, close)| close));
+        match cells.last_mut().filter(|_| closing.is_some()) {
+            Some(cell) => *cell = format!("{cell} {word}"),
+            None => cells.push(word.clone()),
+        }
+        closing = closing.filter(|close| !word.ends_with(*close));
+    }
+    (cells.len() < words.len()).then_some(cells)
 }
 
 /// Headings of three cells each, `"Zeit";"t";"s"`: name, symbol and unit, combined.

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::field::Field;
 use super::keyed::{is_key_block, is_key_with_values, is_list_of_quantities, repeats_a_key};
-use super::{Row, WORDS};
+use super::{Row, WORDS, is_split_at_words};
 use crate::recording::text::cell::Cell;
 use crate::recording::text::head::Table;
 use crate::recording::text::units;
@@ -25,7 +25,7 @@ pub(super) fn positional(rows: &[Row], table: &Table, used: &[bool]) -> Position
     let near = rows.len().saturating_sub(LINES_FOR_HEADINGS);
     let fitting: Vec<&Row> = rows[near..]
         .iter()
-        .filter(|row| is_heading(&row.cells, table, used))
+        .filter(|row| is_heading(&row.cells, table, used) && !is_split_at_words(&row.cells, table))
         .filter(|row| !is_process_row(&row.cells) && !repeats_a_key(&row.cells))
         .filter(|row| !is_key_with_values(&row.cells) && !is_list_of_quantities(&row.cells))
         .rev()

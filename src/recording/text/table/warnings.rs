@@ -12,6 +12,7 @@ impl Layout {
         let mut warnings: Vec<Warning> =
             of_lines(notes, notes.zeros + self.zeros_above, self.line + rows);
         warnings.extend(self.assumptions());
+        warnings.extend(self.unassigned_headings());
         warnings.extend(self.axes.warnings.iter().cloned());
         warnings.extend(self.count_differs(rows));
         warnings
@@ -25,6 +26,17 @@ impl Layout {
         said.into_iter()
             .map(|text| Warning::new("time-assumed", format!("{text}; {confirm}")))
             .collect()
+    }
+
+    /// A warning if the line above the rows cannot name the columns.
+    fn unassigned_headings(&self) -> Option<Warning> {
+        let line = self.header.unassigned?;
+        let columns = plural(self.header.fields.len(), "column");
+        let message = format!(
+            "line {line} has more words than the {columns} below it, so they have no names; write headings without spaces, \
+             their units as in \"Torque [Nm]\", or separate all cells by tabs or commas"
+        );
+        Some(Warning::new("unassigned-headings", message))
     }
 
     /// A warning if the number of samples in the header differs from the number of rows.
