@@ -9,6 +9,7 @@ mod ramp;
 mod rows;
 mod settling;
 mod solve;
+mod steady;
 mod steps;
 mod terms;
 mod zero;
@@ -24,6 +25,7 @@ use crate::print::{self, plural, rounded};
 use mixed::LoadCurve;
 use plateaus::{PlateauLoads, PlateauReadings};
 use ramp::RampReadings;
+use steady::SteadyReadings;
 use steps::LoadSteps;
 
 /// One reading under a known load.
@@ -155,8 +157,12 @@ pub fn identify(
     let points = plateaus.as_ref().map_or(points, |p| &p.rows);
     let steps = LoadSteps::of(points);
     let is_one_weight = one_weight(points, degree, &steps)?;
-    let settled = settling::settled(points);
+    let steady = SteadyReadings::of(points);
+    let is_at_once = steady.as_ref().is_some_and(SteadyReadings::is_at_once);
+    let settled = settling::settled(points).filter(|_| !is_at_once);
+    let steady = steady.filter(|_| settled.is_none());
     let means = plateaus.as_ref().map_or(points, |p| &p.means);
+    let means = steady.as_ref().map_or(means, |s| &s.points);
     let points = settled.as_ref().map_or(means, |s| &s.points);
     let ramp = ramp::ranges(points);
     let points = ramp.as_ref().map_or(points, |r| &r.points);
@@ -180,6 +186,9 @@ pub fn identify(
     let mut result = Identification::new("static");
     if let Some((settled, shared)) = settled.as_ref().zip(shared) {
         settled.warn(&mut result, (shared / fit.values[1]).abs());
+    }
+    if let Some(steady) = &steady {
+        steady.warn(&mut result);
     }
     if steps.is_sorted {
         rows::warn_sorted(&mut result);

@@ -45,7 +45,7 @@ const APART: f64 = 1e-3;
 
 /// Long runs of consecutive points at one load. Each point is compared with the first one, as all neighbours in a slow
 /// ramp are at the same load.
-fn runs(points: &[Point], largest: f64) -> Vec<&[Point]> {
+pub(super) fn runs(points: &[Point], largest: f64) -> Vec<&[Point]> {
     let mut runs = Vec::new();
     let mut rest = points;
     while let Some(first) = rest.first() {
