@@ -54,6 +54,8 @@ pub struct RmsErrors {
 
 /// Minimum distance of a parameter from zero, in standard uncertainties.
 const SIGNIFICANT: f64 = 3.0;
+/// Relative distance from an upper bound at which a parameter is at it.
+const AT_BOUND: f64 = 1e-3;
 /// Ratio to another parameter in the same unit below which it is negligible: without hysteresis, the law of Bouc and Wen
 /// is that of a spring.
 const NEGLIGIBLE: f64 = 0.01;
@@ -233,20 +235,30 @@ impl ScoredModel {
     /// An essential parameter of the last effect that does not differ significantly from zero, or its size if that is
     /// nearer to zero than its uncertainty: what such an effect explains, a better fit without it would.
     pub fn insignificant_parameter(&self) -> Option<&'static str> {
+        self.insignificant_of(self.fitted.structure.effects.len().checked_sub(1)?)
+    }
+
+    /// The same of an effect. One that the fit does not determine is not significant, except at its upper bound.
+    pub fn insignificant_of(&self, effect: usize) -> Option<&'static str> {
         let fitted = &self.fitted;
-        let last = fitted.structure.effects.last()?;
-        let first = fitted.values.len() - last.moved();
-        let own = || last.form.parameters.iter().take(last.moved()).enumerate();
+        let structure = &fitted.structure;
+        let before = structure.effects[..effect].iter().map(EffectForm::moved);
+        let first = structure.context.plain_count() + before.sum::<usize>();
+        let own_effect = &structure.effects[effect];
+        let parameters = &own_effect.form.parameters[..own_effect.moved()];
+        let own = || parameters.iter().enumerate();
         let is_zero = |k: usize| {
             let value = fitted.values[first + k];
-            let std = fitted.std[first + k].unwrap_or(0.0);
-            let unit = last.form.parameters[k].unit;
+            let is_at_bound = value >= (1.0 - AT_BOUND) * parameters[k].upper;
+            let unknown = if is_at_bound { 0.0 } else { f64::INFINITY };
+            let std = fitted.std[first + k].unwrap_or(unknown);
+            let unit = parameters[k].unit;
             let beside = own().filter(|(j, p)| *j != k && unit != Unit::Number && p.unit == unit);
             let largest = beside.map(|(j, _)| fitted.values[first + j].abs());
             value <= SIGNIFICANT * std || largest.fold(0.0, f64::max) * NEGLIGIBLE > value
         };
         let is_no_size = |k: usize| {
-            let std = fitted.std[first + k].filter(|_| last.size() == Some(k));
+            let std = fitted.std[first + k].filter(|_| own_effect.size() == Some(k));
             std.is_some_and(|std| fitted.values[first + k].abs() < std)
         };
         own()

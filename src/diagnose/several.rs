@@ -263,15 +263,17 @@ impl SearchState {
     fn needless(&self, without: &[Option<ScoredModel>]) -> Option<usize> {
         let (after, excess) = (&self.after, self.excess());
         let noise = AppliedNoise::of(&self.records);
-        let is_needless = |less: &ScoredModel| {
+        let declared = after.fitted.structure.effects.len() - without.len();
+        let is_needless = |k: usize, less: &ScoredModel| {
             no_gain(after, less).is_some()
+                || after.insignificant_of(declared + k).is_some()
                 || after.criterion() >= less.criterion()
                 || excess.is_too_small(less, after)
                 || !noise.bears_out(less, after)
         };
         let all = without.iter().enumerate();
         let models = all.filter_map(|(k, less)| Some((k, less.as_ref()?)));
-        let needless = models.filter(|(_, less)| is_needless(less));
+        let needless = models.filter(|(k, less)| is_needless(*k, less));
         let least = needless.min_by(|(_, a), (_, b)| a.criterion().total_cmp(&b.criterion()));
         least.map(|(k, _)| k)
     }

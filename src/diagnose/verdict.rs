@@ -144,10 +144,26 @@ pub fn is_above(model: &ScoredModel, floor: Option<NoiseFloor>) -> bool {
 }
 
 impl ScoredModel {
-    /// Noise combined with the 95 % uncertainty due to the constants, which is limited to the noise, as otherwise
-    /// unknown constants would excuse everything.
-    fn with_uncertain(&self, noise_rms: f64) -> f64 {
-        noise_rms.hypot((CERTAIN * self.uncertain_rms).min(noise_rms))
+    /// A noise floor combined with the 95 % uncertainty due to the constants, which is limited to the noise, as otherwise
+    /// unknown constants would excuse everything. They excuse nothing if the records to which they were fitted have more
+    /// than noise left as well.
+    fn with_uncertain(&self, floor: NoiseFloor) -> f64 {
+        let is_fitted = self
+            .over_noise_in_training(floor)
+            .is_none_or(|ratio| ratio < AT_FLOOR);
+        match is_fitted {
+            true => floor
+                .rms
+                .hypot((CERTAIN * self.uncertain_rms).min(floor.rms)),
+            false => floor.rms,
+        }
+    }
+
+    /// The error in the training records over their noise floor, if that is of the same kind as another.
+    fn over_noise_in_training(&self, floor: NoiseFloor) -> Option<f64> {
+        let own = NoiseFloor::of(&self.train(), &self.fitted.passage())?;
+        // Coloured noise is above one floor, but not above the other.
+        (own.from == floor.from).then(|| self.train_rms() / own.rms)
     }
 }
 
@@ -168,7 +184,7 @@ pub fn remains(model: &ScoredModel, tests: &ResidualTests, floor: Option<NoiseFl
     let Some(floor) = floor else {
         return is_dependent;
     };
-    let ratio = model.compared_rms() / model.with_uncertain(floor.rms);
+    let ratio = model.compared_rms() / model.with_uncertain(floor);
     let is_enough = match floor.from {
         NoiseFloorSource::Periods => true,
         NoiseFloorSource::OutOfBand => is_dependent || ratio > FAR_ABOVE && !tests.white,
@@ -210,13 +226,9 @@ impl SearchState {
     /// The plain stand's error in the training records in terms of their noise, if it is far larger than in the hold-out
     /// records: an effect of large motion, which smaller motion does not show.
     pub(super) fn left_in_training(&self) -> Option<f64> {
-        let plain = &self.before;
         let holdout = self.noise_floor?;
-        let noise = NoiseFloor::of(&plain.train(), &plain.fitted.passage())?;
-        // Coloured noise is above one floor, but not above the other.
-        let noise = Some(noise).filter(|noise| noise.from == holdout.from)?;
-        let ratio = plain.train_rms() / noise.rms;
-        let of_holdout = plain.compared_rms() / holdout.rms;
+        let ratio = self.before.over_noise_in_training(holdout)?;
+        let of_holdout = self.before.compared_rms() / holdout.rms;
         (ratio > MORE_IN_TRAINING * of_holdout.max(1.0)).then_some(ratio)
     }
 
@@ -245,9 +257,17 @@ impl SearchState {
     /// little.
     fn follows_input(&self) -> bool {
         let error = self.after.compared_rms();
-        let is_above = |f: NoiseFloor| error > ABOVE * self.after.with_uncertain(f.rms);
+        let is_above = |f: NoiseFloor| error > ABOVE * self.after.with_uncertain(f);
         let is_above = self.noise_floor.is_some_and(is_above);
         is_above && !self.tests.white && !self.tests.independent_of_input
+    }
+
+    /// Whether the records do not determine the size of an effect, and more than noise is left: it imitates another cause.
+    fn is_undetermined(&self) -> bool {
+        let structure = &self.after.fitted.structure;
+        let first = structure.effects.len() - structure.added().len();
+        let mut added = first..structure.effects.len();
+        !self.is_at_noise() && added.any(|k| self.after.insignificant_of(k).is_some())
     }
 
     /// The verdict; rejects the effects where they explain too little.
@@ -274,7 +294,8 @@ impl SearchState {
                 && self.before.compared_rms() > CLEARLY_ABOVE * floor.rms
         });
         if explained >= NAMED || !is_left && !is_known {
-            return match is_left || self.follows_input() || self.leaves_line() {
+            let is_left = is_left || self.follows_input() || self.leaves_line();
+            return match is_left || self.is_undetermined() {
                 true => Verdict::PartlyExplained,
                 false => Verdict::Explained,
             };

@@ -302,10 +302,17 @@ impl Chain {
             Action::Factor(_) | Action::Stiffness(_) => multiply(signal, input, |omega| {
                 action.factor(&self.stand, omega).unwrap_or(Complex64::ONE)
             }),
-            Action::Feedthrough(term) => {
+            Action::Feedthrough(past) => {
                 let mut spectrum = signal.into_spectrum(input);
                 for (k, (y, u)) in spectrum.iter_mut().zip(input.spectrum()).enumerate() {
-                    *y += u * self.gain * term(&self.stand, input.omega_rad_s(k));
+                    let omega = input.omega_rad_s(k);
+                    let sampled = past.sampled.as_ref();
+                    let sampled = sampled
+                        .and_then(|of| of(input.between(), omega, 1.0 / input.rate_hz()))
+                        // The spectrum describes the continuous input.
+                        .map(|of| of / input.between().factor(omega / (TAU * input.rate_hz())));
+                    let response = sampled.unwrap_or_else(|| (past.response)(&self.stand, omega));
+                    *y += u * self.gain * response;
                 }
                 Signal::Spectrum(spectrum)
             }

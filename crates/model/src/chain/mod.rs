@@ -141,7 +141,7 @@ impl Link {
     fn factor(&self, before: Complex64, stand: &ModalResponse, frequency_hz: f64) -> Complex64 {
         let omega = TAU * frequency_hz;
         match &self.action {
-            Action::Feedthrough(term) => 1.0 + term(stand, omega) / before,
+            Action::Feedthrough(past) => 1.0 + (past.response)(stand, omega) / before,
             Action::Recorder { response, .. } => response(frequency_hz),
             action => action.factor(stand, omega).unwrap_or(Complex64::ONE),
         }
@@ -258,7 +258,7 @@ impl Chain {
             return linear().fold(plain, |inverse, link| inverse / factor(link));
         }
         let along = |through: Complex64, link: &Link| match &link.action {
-            Action::Feedthrough(term) => through + term(&self.stand, TAU * frequency_hz),
+            Action::Feedthrough(past) => through + (past.response)(&self.stand, TAU * frequency_hz),
             _ => through * factor(link),
         };
         linear().fold(plain.inv(), along).inv()
@@ -287,7 +287,9 @@ impl Chain {
         any.then_some(move |frequency_hz| {
             let acts_as = torque_as_applied(frequency_hz);
             let add = |sum: Complex64, link: &&Link| match &link.action {
-                Action::Feedthrough(term) => sum + acts_as * term(&self.stand, TAU * frequency_hz),
+                Action::Feedthrough(past) => {
+                    sum + acts_as * (past.response)(&self.stand, TAU * frequency_hz)
+                }
                 _ => sum * link.factor(Complex64::ONE, &self.stand, frequency_hz),
             };
             some.iter().fold(Complex64::ZERO, add)

@@ -49,8 +49,8 @@ impl Chain {
         for link in self.links.iter().filter(|link| link.stage > Stage::Stand) {
             match &link.action {
                 Action::Recorder { response, .. } => scale(&mut record, response(0.0)),
-                Action::Feedthrough(term) => {
-                    let past = self.gain * term(&self.stand, 0.0).re;
+                Action::Feedthrough(past) => {
+                    let past = self.gain * (past.response)(&self.stand, 0.0).re;
                     for (sample, load) in record.iter_mut().zip(loads) {
                         *sample += past * load;
                     }

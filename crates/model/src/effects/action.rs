@@ -8,9 +8,23 @@ use super::lines::SpectralLine;
 use super::spikes::SpikeTrain;
 use crate::modal::ModalResponse;
 use crate::mode::Mode;
+use crate::simulate::Between;
 
 /// A function of the plain stand and the angular frequency in rad/s.
 pub type Frequency = Box<dyn Fn(&ModalResponse, f64) -> Complex64 + Send + Sync>;
+
+/// The exact response of samples to an input that is held or straight between its own, as a factor of their spectrum: a
+/// function of the waveform, the angular frequency in rad/s and the time between samples in s; `None` for another waveform.
+pub type Sampled = Box<dyn Fn(Between, f64, f64) -> Option<Complex64> + Send + Sync>;
+
+/// A response past the stand, relative to the gain.
+pub struct PastStand {
+    /// To a continuous input.
+    pub response: Frequency,
+    /// To jumps and kinks between the samples, which have no spectrum below the Nyquist frequency alone; none where a jump
+    /// has no value, as in a derivative.
+    pub sampled: Option<Sampled>,
+}
 
 /// A change of the dynamic stiffness of each mode: a function of the mode, the angular frequency in rad/s, and its
 /// `1 − (ω/ω₀)² + 2jζ ω/ω₀`.
@@ -61,7 +75,7 @@ pub enum Action {
     Stiffness(StiffnessChange),
     /// A term of the response past the stand: the applied quantity couples directly into the
     /// record.
-    Feedthrough(Frequency),
+    Feedthrough(PastStand),
     /// The known response of the recorder, a factor.
     Recorder {
         /// Its response.

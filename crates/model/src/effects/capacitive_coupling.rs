@@ -6,7 +6,9 @@
 //! below the corner of the stray path** for the first two. Mistaken for `second-mode` below the excitation,
 //! `time-delay` of the other channel.
 
+use super::action::PastStand;
 use super::{Action, Effect, EffectParameter, Form, History, Stage};
+use crate::simulate::Between;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
@@ -29,9 +31,10 @@ pub(super) static EFFECT: Effect = Effect {
             starts: &[&[0.005]],
             build: |p| {
                 let time_s = p[0];
-                Action::Feedthrough(Box::new(move |_, omega| {
-                    Complex64::new(0.0, omega * time_s)
-                }))
+                Action::Feedthrough(PastStand {
+                    response: Box::new(move |_, omega| Complex64::new(0.0, omega * time_s)),
+                    sampled: None,
+                })
             },
         },
         Form {
@@ -59,10 +62,15 @@ pub(super) static EFFECT: Effect = Effect {
             starts: &[&[0.01, 0.3], &[0.01, 1.0], &[0.01, 4.0], &[0.1, 40.0]],
             build: |p| {
                 let (share, corner) = (p[0], TAU * p[1]);
-                Action::Feedthrough(Box::new(move |_, omega| {
-                    let s = Complex64::new(0.0, omega / corner);
-                    share * s / (1.0 + s)
-                }))
+                Action::Feedthrough(PastStand {
+                    response: Box::new(move |_, omega| {
+                        let s = Complex64::new(0.0, omega / corner);
+                        share * s / (1.0 + s)
+                    }),
+                    sampled: Some(Box::new(move |between, omega, step_s| {
+                        Some(share * (1.0 - sampled_low_pass(between, corner, omega, step_s)?))
+                    })),
+                })
             },
         },
         Form {
@@ -84,6 +92,28 @@ pub(super) static EFFECT: Effect = Effect {
     ],
 };
 
+/// Response of the samples of a first-order low-pass to samples that are held, or straight between: `y_k = a y_(k−1) + b₀
+/// u_k + b₁ u_(k−1)` with `a = e^(−ω_c T)`, and `b₀ = 0`, `b₁ = 1 − a` for held ones, `b₀ = 1 − m`, `b₁ = m − a` with `m = (1
+/// − a)/(ω_c T)` for straight ones (G. F. Franklin, J. D. Powell, M. Workman, *Digital Control of Dynamic Systems*, 3rd ed.,
+/// 1998, 6.3).
+fn sampled_low_pass(
+    between: Between,
+    corner_rad_s: f64,
+    omega_rad_s: f64,
+    step_s: f64,
+) -> Option<Complex64> {
+    let steps = corner_rad_s * step_s;
+    let a = (-steps).exp();
+    let mean = -(-steps).exp_m1() / steps;
+    let [now, before] = match between {
+        Between::BandLimited => return None,
+        Between::Held => [0.0, 1.0 - a],
+        Between::StraightLines => [1.0 - mean, mean - a],
+    };
+    let back = Complex64::cis(-omega_rad_s * step_s);
+    Some((now + before * back) / (1.0 - a * back))
+}
+
 /// Removes the slope introduced by dividing out a link that blocks constants: what it blocked is known except for a
 /// constant at either end.
 pub fn level(before: &[f64], after: &mut [f64]) {
@@ -99,5 +129,46 @@ pub fn level(before: &[f64], after: &mut [f64]) {
     let slope = sum / squares;
     for (i, a) in after.iter_mut().enumerate() {
         *a -= slope * (i as f64 - middle);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A jump from 0 to 1 that is held, and a ramp of one per sample, against the closed forms `1 − e^(−ω_c t)` and `t − (1 −
+    /// e^(−ω_c t))/ω_c`, by the recursion whose response this is.
+    #[test]
+    fn samples_of_a_low_pass_are_those_of_its_motion() {
+        let (corner, step_s, count) = (0.7, 1.0, 4096);
+        let run = |between, input: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            // The response to one sample, from the spectrum.
+            let omega = |k: usize| TAU * k as f64 / count as f64;
+            let lines: Vec<Complex64> = (0..count)
+                .map(|k| sampled_low_pass(between, corner, omega(k), step_s).unwrap())
+                .collect();
+            let pulse = |n: usize| -> f64 {
+                let turn = |k: usize| Complex64::cis(omega(k * n % count));
+                let all = lines.iter().enumerate().map(|(k, line)| line * turn(k));
+                all.sum::<Complex64>().re / count as f64
+            };
+            let pulse: Vec<f64> = (0..12).map(pulse).collect();
+            (0..12)
+                .map(|n| (0..=n).map(|k| pulse[k] * input(n - k)).sum())
+                .collect()
+        };
+        let held = run(Between::Held, &|_| 1.0);
+        let straight = run(Between::StraightLines, &|n| n as f64);
+        for n in 0..12 {
+            let t = n as f64;
+            let risen = 1.0 - (-corner * t).exp();
+            assert!((held[n] - risen).abs() < 1e-9, "{n}: {}", held[n]);
+            assert!(
+                (straight[n] - (t - risen / corner)).abs() < 1e-9,
+                "{n}: {}",
+                straight[n]
+            );
+        }
+        assert_eq!(sampled_low_pass(Between::BandLimited, 1.0, 1.0, 1.0), None);
     }
 }
