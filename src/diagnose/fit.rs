@@ -258,7 +258,7 @@ fn nuisance_of(
 }
 
 /// Re-estimates the initial state of each record; returns whether any record changed.
-fn correct_starts(
+pub(super) fn correct_starts(
     structure: &Structure,
     values: &[f64],
     records: &mut [StandRecord],

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use torqcomp_model::simulate::MotionState;
 
 use super::declared::DeclaredStand;
-use super::fit::{FitEffort, FittedModel};
+use super::fit::{FitEffort, FittedModel, correct_starts};
 use super::record::{NuisanceTerms, StandRecord};
 use super::residual_tests::without_mean;
 use super::several_modes::fit_with_modes;
@@ -85,8 +85,14 @@ pub fn refine_plain(
         ..declared
     };
     let fits = [declared, fitted].map(|stand| {
-        let values = stand.values(&context);
-        fit_with_modes(stand.structure(context.clone()), &values, train, REFINEMENT)
+        let (structure, values) = (stand.structure(context.clone()), stand.values(&context));
+        let (model, _) = structure.model(&values);
+        let mut train = train.to_vec();
+        if model.is_integrated() {
+            // From rest, the phase of a free decay would find no minimum.
+            correct_starts(&structure, &values, &mut train, &model.free_mode());
+        }
+        fit_with_modes(structure, &values, &train, REFINEMENT)
     });
     let [declared, fitted] = fits;
     match (declared, fitted) {
