@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use torqcomp_model::fit::FitError;
 use torqcomp_model::simulate::MotionState;
 
 use super::declared::DeclaredStand;
@@ -92,7 +93,13 @@ pub fn refine_plain(
             // From rest, the phase of a free decay would find no minimum.
             correct_starts(&structure, &values, &mut train, &model.free_mode());
         }
-        fit_with_modes(structure, &values, &train, REFINEMENT)
+        let fitted = fit_with_modes(structure, &values, &train, REFINEMENT)?;
+        let on = |fit: &FittedModel| fit.refit(&train, REFINEMENT).unwrap_or(fit.clone());
+        let is_free = model.is_integrated() && train.iter().all(StandRecord::is_free);
+        Ok::<_, FitError>(match is_free {
+            true => fitted.from_both_sides(on),
+            false => fitted,
+        })
     });
     let [declared, fitted] = fits;
     match (declared, fitted) {

@@ -89,6 +89,8 @@ const FULL_FIT: FitEffort = FitEffort::full(15);
 /// Maximum number of successive full fits, and ratio of successive sums of squares above which they end.
 const MOST_FULL_FITS: usize = 4;
 const FALLING: f64 = 0.9;
+/// Factors of the size of an effect from which it is fitted again.
+const SIDES: [f64; 2] = [1.02, 0.98];
 /// Maximum sum of squares of a fit, relative to the best one, that is continued, and minimum relative reduction by that.
 const NEAR: f64 = 1.1;
 const NEARER: f64 = 1e-4;
@@ -326,16 +328,24 @@ pub fn fit_all(
     fits
 }
 
-/// Continues the fits that are nearly as good as the best one, so that none loses because it has not converged.
+/// Continues the fits that are nearly as good as the best one, so that none loses because it has not converged. Where
+/// decays stick, a small change of friction moves the moment by whole half periods: fits of decays, the best one
+/// included, are also continued from either side of where they ended.
 fn fit_near_best(fits: &mut [Option<ScoredModel>], records: &Records, workers: Workers) {
     let sum =
         |fit: &Option<ScoredModel>| fit.as_ref().map_or(f64::INFINITY, |m| m.fitted.train_sum);
     let least = fits.iter().map(sum).fold(f64::INFINITY, f64::min);
-    let is_near = |k: &usize| (least * (1.0 + 1e-9)..NEAR * least).contains(&sum(&fits[*k]));
+    let is_free = records.are_free();
+    let first = if is_free { least } else { least * (1.0 + 1e-9) };
+    let is_near = |k: &usize| (first..NEAR * least).contains(&sum(&fits[*k]));
     let near: Vec<usize> = (0..fits.len()).filter(is_near).collect();
     let found = parallel(near.len(), workers.threads, |i| {
         let model = fits[near[i]].as_ref()?;
-        let further = to_the_end(&model.fitted, records);
+        let on = |fit: &FittedModel| to_the_end(fit, records);
+        let further = match is_free {
+            true => model.fitted.from_both_sides(on),
+            false => on(&model.fitted),
+        };
         let is_less = further.train_sum < (1.0 - NEARER) * model.fitted.train_sum;
         let scored = is_less.then(|| ScoredModel::of(further, records));
         scored.flatten().map(ScoredModel::without_samples)
@@ -344,6 +354,27 @@ fn fit_near_best(fits: &mut [Option<ScoredModel>], records: &Records, workers: W
         if fit.is_some() {
             fits[k] = fit;
         }
+    }
+}
+
+impl FittedModel {
+    /// The best continuation of a fit from its values, and from those with a slightly larger or smaller size of its last
+    /// effect.
+    pub fn from_both_sides(&self, on: impl Fn(&Self) -> Self) -> Self {
+        let last = self.structure.effects.last();
+        let size = last.and_then(|last| Some(self.values.len() - last.moved() + last.size()?));
+        let beside = |factor: f64| {
+            let mut beside = self.clone();
+            beside.values[size?] *= factor;
+            Some(on(&beside))
+        };
+        let sides = SIDES.into_iter().filter_map(beside);
+        sides.fold(on(self), |best, next| {
+            match next.train_sum < best.train_sum {
+                true => next,
+                false => best,
+            }
+        })
     }
 }
 
