@@ -124,7 +124,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["one-series", "the loads were applied only once, so the repeatability is unknown", "repeat the series"],
         ["rows-sorted", "the rows of loads are sorted by load and reading", "restore the order in which they were taken"],
         ["still-settling", "readings had not settled when the load was changed: their settled values are extrapolated", "keep each load for longer"],
-        ["unsettled-left-out", "readings right after changes of the load still settle; each load counts once, with the settled value of its rows", "let readings settle, or give one row per load"],
+        ["unsettled-left-out", "readings right after, or before, changes of the load are not steady; each load counts once, with the settled value of its rows", "let readings settle, or give one row per load"],
         ["one-weight", "a single load besides zero does not reveal a nonlinear characteristic", "apply further loads"],
         ["poor-fit", "the model does not explain much of the data", "check the columns; choose another range, band or degree"],
         ["zero-drifts", "the reading without load drifts over the test", "allow a longer warm-up, and read the zero of each record"],

@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 
-use crate::decays::{NOISE, PLAIN, Stand};
+use crate::decays::{NOISE, PLAIN, Stand, parameter};
 use crate::noise::Noise;
 use crate::util::{Folder, codes, number};
 
@@ -120,6 +120,26 @@ fn loads_show_the_loop_of_dry_friction_that_ringing_tells_of() {
     let folder = folder(&stand, |_| next.borrow_mut().next().expect("a reading"));
     let report = folder.json(&[&DIAGNOSE[..], &APPLIED, &["--json"]].concat());
     assert_eq!(report["effects"], json!(["coulomb-friction"]));
+    let [value, std] = parameter(&report, "coulomb-friction", "torque");
+    assert!((value - friction).abs() < 4.0 * std, "{value} ± {std}");
+    // Declared 1 % too small, it is fitted and nothing is missing.
+    folder.write(
+        "stand.toml",
+        "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"20 Hz\"\ndamping_ratio = 0.01\n\
+         [calibration]\ntorque_per_volt = \"12.5 N m/V\"\n[[effects]]\nkind = \"coulomb-friction\"\nform = \"sharp\"\n\
+         torque = \"0.12375 N m\"\n",
+    );
+    let decays = [
+        "diagnose",
+        "--stand",
+        "stand.toml",
+        "--decay",
+        "first.csv",
+        "--json",
+    ];
+    let more = ["--holdout-decay", "second.csv", "--measured", "gage"];
+    let declared = folder.json(&[&decays[..], &more].concat());
+    assert_eq!(declared["verdict"], "nothing-missing", "{declared}");
     let [before, after] = errors(&report);
     assert!(
         before > 5.0 && (0.5..1.4).contains(&after),

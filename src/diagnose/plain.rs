@@ -97,7 +97,7 @@ pub fn refine_plain(
         let on = |fit: &FittedModel| fit.refit(&train, REFINEMENT).unwrap_or(fit.clone());
         let is_free = model.is_integrated() && train.iter().all(StandRecord::is_free);
         Ok::<_, FitError>(match is_free {
-            true => fitted.from_both_sides(on),
+            true => fitted.on_both_sides(on),
             false => fitted,
         })
     });

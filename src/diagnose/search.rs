@@ -343,7 +343,7 @@ fn fit_near_best(fits: &mut [Option<ScoredModel>], records: &Records, workers: W
         let model = fits[near[i]].as_ref()?;
         let on = |fit: &FittedModel| to_the_end(fit, records);
         let further = match is_free {
-            true => model.fitted.from_both_sides(on),
+            true => model.fitted.on_both_sides(on),
             false => on(&model.fitted),
         };
         let is_less = further.train_sum < (1.0 - NEARER) * model.fitted.train_sum;
@@ -360,7 +360,7 @@ fn fit_near_best(fits: &mut [Option<ScoredModel>], records: &Records, workers: W
 impl FittedModel {
     /// The best continuation of a fit from its values, and from those with a slightly larger or smaller size of its last
     /// effect.
-    pub fn from_both_sides(&self, on: impl Fn(&Self) -> Self) -> Self {
+    pub fn on_both_sides(&self, on: impl Fn(&Self) -> Self) -> Self {
         let last = self.structure.effects.last();
         let size = last.and_then(|last| Some(self.values.len() - last.moved() + last.size()?));
         let beside = |factor: f64| {

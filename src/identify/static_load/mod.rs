@@ -25,6 +25,7 @@ use crate::print::{self, plural, rounded};
 use mixed::LoadCurve;
 use plateaus::{PlateauLoads, PlateauReadings};
 use ramp::RampReadings;
+use settling::SettledReadings;
 use steady::SteadyReadings;
 use steps::LoadSteps;
 
@@ -144,6 +145,15 @@ fn one_weight(points: &[Point], degree: usize, steps: &LoadSteps) -> Result<bool
     Ok(is_one_weight)
 }
 
+/// The readings that settle after each change of the load, or else those that are steady in a part of its rows.
+fn unsettled(points: &[Point]) -> (Option<SettledReadings>, Option<SteadyReadings>) {
+    let steady = SteadyReadings::of(points);
+    let is_at_once = steady.as_ref().is_some_and(SteadyReadings::is_at_once);
+    let settled = settling::settled(points).filter(|_| !is_at_once);
+    let steady = steady.filter(|_| settled.is_none());
+    (settled, steady)
+}
+
 /// Evaluates the points with a curve of degree 1 or 3.
 ///
 /// # Errors
@@ -157,10 +167,7 @@ pub fn identify(
     let points = plateaus.as_ref().map_or(points, |p| &p.rows);
     let steps = LoadSteps::of(points);
     let is_one_weight = one_weight(points, degree, &steps)?;
-    let steady = SteadyReadings::of(points);
-    let is_at_once = steady.as_ref().is_some_and(SteadyReadings::is_at_once);
-    let settled = settling::settled(points).filter(|_| !is_at_once);
-    let steady = steady.filter(|_| settled.is_none());
+    let (settled, steady) = unsettled(points);
     let means = plateaus.as_ref().map_or(points, |p| &p.means);
     let means = steady.as_ref().map_or(means, |s| &s.points);
     let points = settled.as_ref().map_or(means, |s| &s.points);
