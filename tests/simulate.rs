@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 use std::fmt::Write;
 
 use crate::diagnose::diagnose;
+use crate::motion;
 use crate::noise::Noise;
 use crate::util::{Folder, SIMULATE, table};
 
@@ -70,6 +71,80 @@ fn held_samples_are_simulated_as_they_are() {
     let whole = settled.map(|i| truth[i].powi(2));
     let relative = (left.sum::<f64>() / whole.sum::<f64>()).sqrt();
     assert!(relative < 1e-3, "{relative:e}");
+}
+
+/// Rms difference of a simulation of held samples from the truth, over that of the truth.
+fn off_when_held(effect: &str, applied: &[f64], truth: &[f64]) -> f64 {
+    let folder = Folder::new();
+    folder.write("stand.toml", format!("{STAND}[[effects]]\n{effect}\n"));
+    folder.write("record.csv", record(applied, truth));
+    let ran = folder.run(&[&SIMULATE[..], &["--between", "held", "-o", "answer.csv"]].concat());
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let (_, rows) = table(&folder.read("answer.csv"));
+    let settled = 1000..truth.len() - 100;
+    let left = settled.clone().map(|i| (rows[i][1] - truth[i]).powi(2));
+    let whole = settled.map(|i| truth[i].powi(2));
+    (left.sum::<f64>() / whole.sum::<f64>()).sqrt()
+}
+
+/// A leak past the stand shows the jumps of a held input from their sample on; half of each had been missing.
+#[test]
+fn a_leak_follows_the_jumps_of_held_samples() {
+    // Plateaus of 7 to 19 samples.
+    let mut noise = Noise(3);
+    let (mut level, mut left) = (0.0, 0);
+    let level_at = |_| {
+        if left == 0 {
+            (level, left) = (noise.normal(), 7 + (12.0 * noise.uniform()) as usize);
+        }
+        left -= 1;
+        level
+    };
+    let applied: Vec<f64> = (0..6000).map(level_at).collect();
+    // The low-pass of the corner relaxes towards each sample until the next.
+    let kept = (-TAU * 300.0 / RATE_HZ).exp();
+    let mut low = applied[0];
+    let passed = applied.iter().map(|u| {
+        let now = low;
+        low = u + (low - u) * kept;
+        u - now
+    });
+    let stand = held(&applied);
+    let truth: Vec<f64> = stand
+        .iter()
+        .zip(passed)
+        .map(|(x, high)| x + 0.4 * high)
+        .collect();
+    let leak = "kind = \"capacitive-coupling\"\nform = \"high-pass-leak\"\nshare = 0.4\ncorner = \"300 Hz\"";
+    let off = off_when_held(leak, &applied, &truth);
+    assert!(off < 3e-3, "{off:e}");
+}
+
+/// Play between stator and beam, with the gage on the beam: the beam carries `w`, dragged along within the gap, and the
+/// gage shows it.
+#[test]
+fn a_gage_on_a_beam_with_play_shows_the_beam() {
+    const STEPS: usize = 64;
+    let gap = 0.05;
+    let applied: Vec<f64> = input(5, 6000);
+    let omega = TAU * 600.0;
+    let h = 1.0 / (RATE_HZ * STEPS as f64);
+    let (mut state, mut beam) = ([0.0; 2], 0.0_f64);
+    let mut truth = Vec::new();
+    for u in &applied {
+        truth.push(beam);
+        for _ in 0..STEPS {
+            let slope = |_: f64, [x, v]: [f64; 2]| {
+                let w = beam.clamp(x - gap, x + gap);
+                [v, omega * omega * (u - w) - 2.0 * 0.08 * omega * v]
+            };
+            state = motion::step(state, 0.0, h, slope);
+            beam = beam.clamp(state[0] - gap, state[0] + gap);
+        }
+    }
+    let play = "kind = \"backlash\"\nform = \"joint-shown\"\ngap = \"0.05 N m\"";
+    let off = off_when_held(play, &applied, &truth);
+    assert!(off < 5e-3, "{off:e}");
 }
 
 /// One period of a sum of sines starting at phase 0: in the steady-state response, each line has the closed-form
