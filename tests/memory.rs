@@ -163,7 +163,7 @@ const VERBS: [Measured; 10] = [
         "diagnose --train LONG --applied driving --measured driven",
         &["driving_Nm", "driven_Nm"],
         [20_000, 60_000],
-        600.0,
+        700.0,
     ),
 ];
 
