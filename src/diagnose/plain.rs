@@ -94,7 +94,10 @@ pub fn refine_plain(
             correct_starts(&structure, &values, &mut train, &model.free_mode());
         }
         let fitted = fit_with_modes(structure, &values, &train, REFINEMENT)?;
-        let on = |fit: &FittedModel| fit.refit(&train, REFINEMENT).unwrap_or(fit.clone());
+        let on = |fit: &FittedModel| {
+            fit.refit(&train, REFINEMENT)
+                .unwrap_or_else(|_| fit.clone())
+        };
         let is_free = model.is_integrated() && train.iter().all(StandRecord::is_free);
         Ok::<_, FitError>(match is_free {
             true => fitted.on_both_sides(on),

@@ -263,7 +263,7 @@ impl SearchState {
     fn needless(&self, without: &[Option<ScoredModel>]) -> Option<usize> {
         let (after, excess) = (&self.after, self.excess());
         let noise = AppliedNoise::of(&self.records);
-        let declared = after.fitted.structure.effects.len() - without.len();
+        let declared = after.fitted.structure.declared;
         let is_needless = |k: usize, less: &ScoredModel| {
             no_gain(after, less).is_some()
                 || after.insignificant_of(declared + k).is_some()

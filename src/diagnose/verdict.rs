@@ -263,10 +263,9 @@ impl SearchState {
     }
 
     /// Whether the records do not determine the size of an effect, and more than noise is left: it imitates another cause.
-    fn is_undetermined(&self) -> bool {
+    fn imitates(&self) -> bool {
         let structure = &self.after.fitted.structure;
-        let first = structure.effects.len() - structure.added().len();
-        let mut added = first..structure.effects.len();
+        let mut added = structure.declared..structure.effects.len();
         !self.is_at_noise() && added.any(|k| self.after.insignificant_of(k).is_some())
     }
 
@@ -295,7 +294,7 @@ impl SearchState {
         });
         if explained >= NAMED || !is_left && !is_known {
             let is_left = is_left || self.follows_input() || self.leaves_line();
-            return match is_left || self.is_undetermined() {
+            return match is_left || self.imitates() {
                 true => Verdict::PartlyExplained,
                 false => Verdict::Explained,
             };

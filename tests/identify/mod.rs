@@ -27,6 +27,18 @@ fn times(count: usize, rate_hz: f64) -> Vec<f64> {
     (0..count).map(|i| i as f64 / rate_hz).collect()
 }
 
+/// Motion of a stand of unit static gain after a time of a torque that grows by one per s, in closed form.
+fn ramped(hz: f64, ratio: f64, t: f64) -> f64 {
+    let omega = TAU * hz;
+    let damped = omega * (1.0 - ratio * ratio).sqrt();
+    if t <= 0.0 {
+        return 0.0;
+    }
+    let swing = 2.0 * ratio / omega * (damped * t).cos()
+        + (2.0 * ratio * ratio - 1.0) / damped * (damped * t).sin();
+    t - 2.0 * ratio / omega + (-ratio * omega * t).exp() * swing
+}
+
 /// What a decay gives on its own.
 fn of_decay(record: &[f64], rate_hz: f64) -> Identification {
     let ringing = Ringing {

@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use super::{Noise, TAU, parameter};
+use super::{Noise, TAU, parameter, ramped};
 use crate::util::{Folder, assert_close, codes};
 
 fn has(report: &Value, code: &str) {
@@ -861,16 +861,7 @@ fn one_step_shows_its_resonance() {
     const GAIN: f64 = 0.08;
     let (rate_hz, ratio, rise_s) = (20_000.0, 0.02_f64, 3e-4);
     for (hz, seed) in [(70.0, 61), (590.0, 62)] {
-        let omega = TAU * hz;
-        let damped = omega * (1.0 - ratio * ratio).sqrt();
-        let ramp = |t: f64| match t > 0.0 {
-            true => {
-                let swing = 2.0 * ratio / omega * (damped * t).cos()
-                    + (2.0 * ratio * ratio - 1.0) / damped * (damped * t).sin();
-                t - 2.0 * ratio / omega + (-ratio * omega * t).exp() * swing
-            }
-            false => 0.0,
-        };
+        let ramp = |t: f64| ramped(hz, ratio, t);
         let mut noise = Noise(seed);
         let row = |i: usize| {
             let t = i as f64 / rate_hz - 0.1;

@@ -62,8 +62,8 @@ pub struct BridgedGap {
 /// Interpolates stamped samples on the grid `t₀ + k Δt`, `t₀` being the first stamp.
 ///
 /// Between close stamps the polynomial through the eight nearest points is used (four on each side,
-/// Lagrange interpolation), across a gap and next to stamps that nearly coincide a straight line. Streaming: results are output as soon as
-/// the points after them are available.
+/// Lagrange interpolation), across a gap and next to stamps that nearly coincide a straight line. Streaming: results are
+/// output as soon as the points after them are available.
 #[derive(Debug)]
 pub struct Resampler {
     step_s: f64,

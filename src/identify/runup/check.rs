@@ -1,5 +1,7 @@
 //! Rejection of records without a run.
 
+use std::borrow::Cow;
+
 use super::{FreeRun, LEAST_WINDOWS, SHORTEST_HALF};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::{Motion, rms};
@@ -61,21 +63,23 @@ const GOOD_SWING: usize = 2 * LEAST_SWING;
 const REVERSALS: usize = 3;
 
 /// Median number of samples between reversals, if there are some and they are known.
-pub(super) fn samples_per_swing(run: &FreeRun) -> Option<usize> {
+fn samples_per_swing(run: &FreeRun) -> Option<usize> {
     let speed = match run.kind {
-        Motion::Speed => run.motion.to_vec(),
-        Motion::Displacement => run
-            .motion
-            .windows(2)
-            .map(|pair| pair[1] - pair[0])
-            .collect(),
+        Motion::Speed => Cow::Borrowed(run.motion),
+        Motion::Displacement => {
+            let steps = run.motion.windows(2);
+            steps.map(|pair| pair[1] - pair[0]).collect()
+        }
         Motion::Acceleration => return None,
     };
     let least = MOVES * rms(&speed);
-    let moving = speed.iter().enumerate().filter(|(_, v)| v.abs() > least);
-    let moving: Vec<(usize, bool)> = moving.map(|(i, v)| (i, *v > 0.0)).collect();
-    let turns = moving.windows(2).filter(|pair| pair[0].1 != pair[1].1);
-    let turns: Vec<usize> = turns.map(|pair| pair[1].0).collect();
+    let (mut turns, mut before) = (Vec::new(), 0.0);
+    for (i, v) in speed.iter().enumerate().filter(|(_, v)| v.abs() > least) {
+        if v * before < 0.0 {
+            turns.push(i);
+        }
+        before = *v;
+    }
     let mut swings: Vec<f64> = turns
         .windows(2)
         .map(|pair| (pair[1] - pair[0]) as f64)
@@ -86,29 +90,20 @@ pub(super) fn samples_per_swing(run: &FreeRun) -> Option<usize> {
     }
 }
 
-/// Rejects runs that reverse within so few samples that the averages span several reversals.
-pub(super) fn swings(run: &FreeRun) -> Result<(), Failure> {
-    match samples_per_swing(run).filter(|samples| *samples < LEAST_SWING) {
-        None => Ok(()),
-        Some(samples) => Err(Failure::failed(
-            ErrorCode::UnsuitableRecord,
-            few(run, samples),
-        )),
-    }
-}
-
-/// What is wrong with few samples per swing.
-fn few(run: &FreeRun, samples: usize) -> String {
-    format!(
+/// Rejects runs that reverse within so few samples that the averages span several reversals; returns a warning about those
+/// whose reversals are barely resolved.
+pub(super) fn swings(run: &FreeRun) -> Result<Option<String>, Failure> {
+    let Some(samples) = samples_per_swing(run).filter(|samples| *samples < GOOD_SWING) else {
+        return Ok(None);
+    };
+    let message = format!(
         "the body reverses about every {samples} samples, which does not show when, so that dry and viscous friction cannot be \
          told apart; record at {} Hz or more instead of {} Hz, or reverse less often",
         rounded(run.rate_hz * GOOD_SWING as f64 / samples as f64, 2),
         short(run.rate_hz)
-    )
-}
-
-/// A warning if the reversals of a run are barely resolved.
-pub(super) fn few_samples_per_swing(run: &FreeRun) -> Option<String> {
-    let samples = samples_per_swing(run).filter(|samples| *samples < GOOD_SWING)?;
-    Some(few(run, samples))
+    );
+    match samples < LEAST_SWING {
+        true => Err(Failure::failed(ErrorCode::UnsuitableRecord, message)),
+        false => Ok(Some(message)),
+    }
 }

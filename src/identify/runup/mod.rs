@@ -101,7 +101,7 @@ pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification,
         motion: &motion,
         ..*run
     };
-    check::swings(run)?;
+    let few_samples = check::swings(run)?;
     let directions = Directions::of(run)?;
     let split = options.by_direction && directions.both();
     let half = match options.half_window_s {
@@ -121,7 +121,13 @@ pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification,
     result.method.extend(wrapped::method(wraps));
     present::method(&mut result, run, &directions, &fitted);
     present::draw(&mut result, run, &fitted);
-    present::warnings(&mut result, run, &directions, options, &fitted);
+    present::warnings(
+        &mut result,
+        run,
+        &directions,
+        (options, few_samples),
+        &fitted,
+    );
     let is_both = directions.both();
     // The comparison takes the most memory.
     drop(fitted);

@@ -1,6 +1,5 @@
 //! Names, method, charts and warnings of a run-up.
 
-use super::check;
 use super::directions::Directions;
 use super::resolution::too_few;
 use super::windows::FittedRows;
@@ -99,7 +98,7 @@ pub(super) fn warnings(
     result: &mut Identification,
     run: &FreeRun,
     directions: &Directions,
-    options: &RunupOptions,
+    (options, few_samples): (&RunupOptions, Option<String>),
     fitted: &FittedRows,
 ) {
     if run.kind == Motion::Acceleration {
@@ -122,7 +121,7 @@ pub(super) fn warnings(
              offset, dry_friction ± offset is the dry friction in each direction",
         );
     }
-    if let Some(message) = check::few_samples_per_swing(run) {
+    if let Some(message) = few_samples {
         result.warn("few-samples-per-swing", message);
     }
     coarse(result, run, directions, fitted);

@@ -147,9 +147,12 @@ fn one_weight(points: &[Point], degree: usize, steps: &LoadSteps) -> Result<bool
 
 /// The readings that settle after each change of the load, or else those that are steady in a part of its rows.
 fn unsettled(points: &[Point]) -> (Option<SettledReadings>, Option<SteadyReadings>) {
-    let steady = SteadyReadings::of(points);
+    let Some(runs) = settling::logged(points) else {
+        return (None, None);
+    };
+    let steady = SteadyReadings::of(&runs);
     let is_at_once = steady.as_ref().is_some_and(SteadyReadings::is_at_once);
-    let settled = settling::settled(points).filter(|_| !is_at_once);
+    let settled = settling::settled(&runs).filter(|_| !is_at_once);
     let steady = steady.filter(|_| settled.is_none());
     (settled, steady)
 }

@@ -115,7 +115,7 @@ impl PlateauReadings {
 }
 
 /// Mean reading of rows at one load.
-fn mean(rows: &[Point]) -> Point {
+pub(super) fn mean(rows: &[Point]) -> Point {
     let sum: f64 = rows.iter().map(|p| p.reading).sum();
     Point {
         reading: sum / rows.len() as f64,

@@ -43,9 +43,27 @@ const VAGUE: f64 = 5.0;
 const MISSING: f64 = 0.01;
 const APART: f64 = 1e-3;
 
+/// The runs at one load of a data logger whose loads change in clear steps; `None` for other tables.
+pub(super) fn logged(points: &[Point]) -> Option<Vec<&[Point]>> {
+    // Sorted readings rise at each load as settling ones do.
+    if rows::is_sorted(points) {
+        return None;
+    }
+    let largest = points.iter().fold(0.0_f64, |m, p| m.max(p.load.abs()));
+    let runs = runs(points, largest);
+    let rows = runs.iter().map(|run| run.len()).sum::<usize>();
+    let mut changes: Vec<f64> = runs
+        .windows(2)
+        .map(|pair| (pair[1][0].load - pair[0][0].load).abs())
+        .collect();
+    let change = median(&mut changes)?;
+    let is_logged = runs.len() > CHANGES && is_stepwise(rows, points.len(), change, largest);
+    is_logged.then_some(runs)
+}
+
 /// Long runs of consecutive points at one load. Each point is compared with the first one, as all neighbours in a slow
 /// ramp are at the same load.
-pub(super) fn runs(points: &[Point], largest: f64) -> Vec<&[Point]> {
+fn runs(points: &[Point], largest: f64) -> Vec<&[Point]> {
     let mut runs = Vec::new();
     let mut rest = points;
     while let Some(first) = rest.first() {
@@ -80,36 +98,21 @@ pub(super) struct SettledReadings {
     is_exponential: bool,
 }
 
-/// The settled readings; `None` if no settling is found.
-pub(super) fn settled(points: &[Point]) -> Option<SettledReadings> {
-    // Sorted readings rise at each load as settling ones do.
-    if rows::is_sorted(points) {
-        return None;
-    }
-    let largest = points.iter().fold(0.0_f64, |m, p| m.max(p.load.abs()));
-    let runs = runs(points, largest);
-    let rows = runs.iter().map(|run| run.len()).sum::<usize>();
-    let mut changes: Vec<f64> = runs
-        .windows(2)
-        .map(|pair| (pair[1][0].load - pair[0][0].load).abs())
-        .collect();
-    let change = median(&mut changes)?;
-    if runs.len() <= CHANGES || !is_stepwise(rows, points.len(), change, largest) {
-        return None;
-    }
-    let first = Settling::fit(&runs, LEFT_OUT[0])?;
-    let lag = first.lag(&runs)?;
+/// The settled readings of a data logger; `None` if no settling is found.
+pub(super) fn settled(runs: &[&[Point]]) -> Option<SettledReadings> {
+    let first = Settling::fit(runs, LEFT_OUT[0])?;
+    let lag = first.lag(runs)?;
     let mut fits = vec![first];
     for part in &LEFT_OUT[1..] {
-        let later = Settling::fit(&runs, *part);
-        match later.filter(|later| later.is_better(&fits[fits.len() - 1], &runs)) {
+        let later = Settling::fit(runs, *part);
+        match later.filter(|later| later.is_better(&fits[fits.len() - 1], runs)) {
             Some(later) => fits.push(later),
             None => break,
         }
     }
     let is_exponential = fits.len() < LEFT_OUT.len();
     let best = fits.pop()?;
-    let mut others: Vec<Settling> = best.neighbour(&runs).into_iter().collect();
+    let mut others: Vec<Settling> = best.neighbour(runs).into_iter().collect();
     others.extend(fits.pop().filter(|_| !is_exponential));
     let mut factors: Vec<f64> = best.runs.iter().map(|run| run.factor).collect();
     let typical = median(&mut factors)?;

@@ -4,11 +4,11 @@
 //! Row by row, a swing would count as a drift of the zero, and the changes of the load, exactly where the weight swings
 //! most, would determine the sensitivity. Such rows are left out, and the mean of the others counts as one reading.
 
-use super::settling::{RUN, is_stepwise, runs};
-use super::{Point, rows, std_of_mean};
+use super::Point;
+use super::plateaus::mean;
+use super::settling::RUN;
 use crate::identify::Identification;
 use crate::print::{plural, rounded};
-use torqcomp_dsp::quality::median;
 
 /// Parts of the rows at each load that are tried, the longest first: from and to.
 const PARTS: [[f64; 2]; 9] = [
@@ -47,25 +47,12 @@ pub(super) struct SteadyReadings {
 }
 
 impl SteadyReadings {
-    /// `None` if all rows are steady and independent, or the loads are not of a data logger.
-    pub fn of(points: &[Point]) -> Option<Self> {
-        if rows::is_sorted(points) {
+    /// From the runs of a data logger; `None` if they are few or short, or all rows are steady and independent.
+    pub fn of(runs: &[&[Point]]) -> Option<Self> {
+        if runs.len() < LOADS || runs.iter().any(|run| run.len() < ROWS) {
             return None;
         }
-        let largest = points.iter().fold(0.0_f64, |m, p| m.max(p.load.abs()));
-        let runs = runs(points, largest);
-        let rows = runs.iter().map(|run| run.len()).sum::<usize>();
-        let steps = runs
-            .windows(2)
-            .map(|pair| (pair[1][0].load - pair[0][0].load).abs());
-        let change = median(&mut steps.collect::<Vec<_>>())?;
-        let is_logged = runs.len() >= LOADS
-            && runs.iter().all(|run| run.len() >= ROWS)
-            && is_stepwise(rows, points.len(), change, largest);
-        if !is_logged {
-            return None;
-        }
-        let parts: Vec<Scatter> = PARTS.iter().map(|part| Scatter::of(&runs, *part)).collect();
+        let parts: Vec<Scatter> = PARTS.iter().map(|part| Scatter::of(runs, *part)).collect();
         let least = parts
             .iter()
             .min_by(|a, b| a.variance.total_cmp(&b.variance))?;
@@ -79,13 +66,9 @@ impl SteadyReadings {
             return None;
         }
         let parts: Vec<&[Point]> = runs.iter().map(|run| within(run, used.part)).collect();
-        let mean = |rows: &&[Point]| Point {
-            reading: rows.iter().map(|p| p.reading).sum::<f64>() / rows.len() as f64,
-            std: std_of_mean(rows),
-            ..rows[0]
-        };
+        let rows = runs.iter().map(|run| run.len()).sum::<usize>();
         Some(Self {
-            points: parts.iter().map(mean).collect(),
+            points: parts.iter().map(|rows| mean(rows)).collect(),
             part: used.part,
             left_out: rows - parts.iter().map(|rows| rows.len()).sum::<usize>(),
             rows,

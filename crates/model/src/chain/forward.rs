@@ -1,6 +1,5 @@
 //! From the applied quantity to the record.
 
-use std::f64::consts::TAU;
 use std::ops::Range;
 
 use num_complex::Complex64;
@@ -272,14 +271,8 @@ impl Chain {
         let spectrum = match input.between() {
             Between::Held => {
                 let held = held_response(&self.stand, 1.0 / input.rate_hz());
-                let line = |(k, u): (usize, &Complex64)| {
-                    // The spectrum describes the continuous input; the sampled motion uses that of
-                    // the samples.
-                    let omega = input.omega_rad_s(k);
-                    let cycles = omega / (TAU * input.rate_hz());
-                    u / Between::Held.factor(cycles) * self.gain * held(omega)
-                };
-                lines.map(line).collect()
+                let motion = |k| input.line_of_samples(k) * self.gain * held(input.omega_rad_s(k));
+                lines.map(|(k, _)| motion(k)).collect()
             }
             _ => {
                 let response = |k| self.stand.response(input.omega_rad_s(k));
@@ -307,12 +300,13 @@ impl Chain {
                 for (k, (y, u)) in spectrum.iter_mut().zip(input.spectrum()).enumerate() {
                     let omega = input.omega_rad_s(k);
                     let sampled = past.sampled.as_ref();
-                    let sampled = sampled
-                        .and_then(|of| of(input.between(), omega, 1.0 / input.rate_hz()))
-                        // The spectrum describes the continuous input.
-                        .map(|of| of / input.between().factor(omega / (TAU * input.rate_hz())));
-                    let response = sampled.unwrap_or_else(|| (past.response)(&self.stand, omega));
-                    *y += u * self.gain * response;
+                    let sampled =
+                        sampled.and_then(|of| of(input.between(), omega, 1.0 / input.rate_hz()));
+                    *y += self.gain
+                        * match sampled {
+                            Some(response) => input.line_of_samples(k) * response,
+                            None => u * (past.response)(&self.stand, omega),
+                        };
                 }
                 Signal::Spectrum(spectrum)
             }

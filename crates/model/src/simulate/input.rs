@@ -147,6 +147,12 @@ impl Excitation {
         &self.spectrum
     }
 
+    /// A line of the samples' own spectrum, without the waveform between them.
+    pub(crate) fn line_of_samples(&self, line: usize) -> Complex64 {
+        let cycles = self.omega_rad_s(line) / (std::f64::consts::TAU * self.rate_hz);
+        self.spectrum[line] / self.between.factor(cycles)
+    }
+
     /// Angular frequency of a line of the spectrum, in rad/s.
     #[must_use]
     pub fn omega_rad_s(&self, line: usize) -> f64 {

@@ -1,7 +1,6 @@
 //! Columns named like time whose values are not used as such.
 
 use super::groups::Group;
-use super::stamps::StampRule;
 use super::{AxisRule, Sources};
 use crate::recording::text::units;
 use crate::warning::Warning;
@@ -28,8 +27,8 @@ impl Sources<'_> {
     }
 
     /// A warning if --time-unit contradicts the heading of the time.
-    pub(super) fn overridden_unit(&self, rule: &StampRule) -> Option<Warning> {
-        let given = self.reading.time_unit.as_ref()?;
+    pub(super) fn overridden_unit(&self, rule: &AxisRule) -> Option<Warning> {
+        let (given, rule) = self.reading.time_unit.as_ref().zip(rule.stamps.as_ref())?;
         let field = &self.fields[rule.place];
         let named = field.unit.as_ref().filter(|named| units::is_time(named))?;
         let differs = (named.unit.factor() / rule.seconds_per_unit - 1.0).abs() > 1e-9;

@@ -177,11 +177,7 @@ impl Sources<'_> {
                 .for_each(|place| roles[*place] = Role::Time);
             let rule = self.rule(&group, named.assumed.as_deref())?;
             warnings.extend(self.other_times(&group, &rule));
-            warnings.extend(
-                rule.stamps
-                    .as_ref()
-                    .and_then(|rule| self.overridden_unit(rule)),
-            );
+            warnings.extend(self.overridden_unit(&rule));
             // The time of columns without numbers is not a channel.
             let is_channel = |place: &&usize| !self.fields[**place].is_label;
             for place in group.channels.iter().filter(is_channel) {
