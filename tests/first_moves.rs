@@ -348,6 +348,39 @@ fn a_line_that_alone_decides_the_band_is_asked_about() {
     assert!(codes(&plain).is_empty(), "{plain}");
 }
 
+/// Interference with many lines, or with a frequency that varies, far above the torque: a carrier with sidebands, and
+/// one that jumps at random.
+#[test]
+fn interference_of_many_lines_is_asked_about() {
+    let folder = Folder::new();
+    let calibration = "[calibration]\ntorque_per_volt = \"12.5 N m/V\"\n";
+    folder.write("stand.toml", stand(calibration));
+    let sidebands = |t: f64| {
+        let line = |k: i32| (TAU * (1600.0 + 21.3 * f64::from(k)) * t + f64::from(k * k)).sin();
+        (-8..=8).map(line).sum::<f64>()
+    };
+    let mut noise = crate::noise::Noise(14);
+    let (mut phase, mut jumping) = (0.0_f64, Vec::new());
+    for i in 0..15_000 {
+        if i % 7 == 0 {
+            phase += noise.normal();
+        }
+        phase += TAU * 1600.0 / 5000.0;
+        jumping.push(3.0 * phase.sin());
+    }
+    for interference in 0..2 {
+        let noise: Vec<f64> = (0..15_000).map(|_| 2e-4 * noise.normal()).collect();
+        let volts = |i: usize| {
+            let t = i as f64 / 5000.0;
+            let beside = [sidebands(t), jumping[i]][interference];
+            0.8 + 0.2 * (TAU * 7.0 * t).sin() + 1e-3 * beside + noise[i]
+        };
+        folder.write("in.csv", sampled("bridge_V", 5000.0, 15_000, volts));
+        let report = folder.json(&[&COMPENSATE[..], &["--force", "--json"]].concat());
+        assert!(codes(&report).contains(&"lines-decide-band"), "{report}");
+    }
+}
+
 /// The zero is that of another record, or mV read as V.
 #[test]
 fn a_zero_far_from_the_record_is_said() {

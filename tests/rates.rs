@@ -61,6 +61,23 @@ fn stamps_in_whole_seconds_do_not_give_a_rate_for_a_resonance() {
     );
 }
 
+/// One row in 100 missing or written twice, or 990 or 1010 Hz in whole milliseconds: the stamps do not tell which.
+#[test]
+fn regular_losses_that_rounded_stamps_would_hide_are_said() {
+    let folder = Folder::new();
+    let stamp = |i: usize| format!("{:.3}", i as f64 * 1e-3);
+    let rows = (0..10_000).filter(|i| i % 100 != 50);
+    folder.write("in.csv", record(stamp, rows));
+    let said = ["at 990 Hz", "at 1000 Hz if one row in 100 is missing"];
+    compensate(&folder, &[]).says(0, &said);
+    let rows = (0..10_000).flat_map(|i| std::iter::repeat_n(i, 1 + usize::from(i % 100 == 50)));
+    folder.write("in.csv", record(stamp, rows));
+    let said = ["at 1010 Hz", "one row in 100 was written twice"];
+    compensate(&folder, &[]).says(0, &said);
+    let given = compensate(&folder, &["--rate", "1000"]);
+    given.says(0, &["rate-overrides-stamps", "give 1010 Hz"]);
+}
+
 /// 800 Hz in whole milliseconds: steps of 1 and 2 ms. Over 12.5 s they determine the rate to better
 /// than 0.01 %.
 #[test]

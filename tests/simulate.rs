@@ -236,6 +236,21 @@ fn stamps_far_from_zero_do_not_move_a_drift() {
     for (a, b) in first.iter().zip(&later) {
         assert!((a - b).abs() < 1e-6, "{a} {b}");
     }
+    // The beginning of the record is where the drift begins.
+    let part = |range: &'static str| {
+        let input = ["record.csv", "--stand", "stand.toml", "--range", range];
+        let simulated = [&["simulate"][..], &input, &["--applied", "applied_n_m"]].concat();
+        let output = ["--channel", "2", "-o", "part.csv"];
+        let compensated = [&["compensate"][..], &input, &output].concat();
+        [simulated, compensated].map(|args| folder.run(&args))
+    };
+    let said = ["thermal-drift", "leaves out its beginning", "as ..2"];
+    for ran in part("0.05..") {
+        ran.says(1, &said);
+    }
+    for ran in part("..0.05") {
+        ran.says(0, &[]);
+    }
 }
 
 #[test]

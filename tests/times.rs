@@ -516,6 +516,10 @@ fn stamps_that_samples_share_give_the_rate() {
         "{}",
         ran.stderr
     );
+    // Interpolating between the stamps would keep one sample in 20.
+    folder
+        .run(&[&args[..], &["--resample"]].concat())
+        .says(1, &["20 samples", "omit it", "20000 Hz"]);
     let extracted = folder.run(&["extract", "record.csv"]);
     assert_eq!(extracted.stdout.lines().count(), 20_001);
     assert!(
@@ -596,6 +600,11 @@ fn a_range_is_taken_by_any_clock() {
         "clock.csv",
         format!("time,bridge [V]\n{}", clock.collect::<String>()),
     );
+    let clock = (0..400).map(|i| format!("2024-03-12T13:26:40.{i:04}+02:00,{i}\n"));
+    folder.write(
+        "zone.csv",
+        format!("time,bridge [V]\n{}", clock.collect::<String>()),
+    );
     for (name, range, first, rows) in [
         ("zero.csv", "0.01..0.0199", "0.0100", 100),
         ("zero.csv", "..0.0099", "0.0000", 100),
@@ -620,6 +629,20 @@ fn a_range_is_taken_by_any_clock() {
             100,
         ),
         ("clock.csv", "13:26:40.01..13:26:40.0199", "0.01", 100),
+        // With a zone, whatever the record's: epoch stamps are in UTC.
+        (
+            "epoch.csv",
+            "2024-03-12T15:26:40.01+02:00..09:26:40.0199-04:00",
+            "1710250000.01",
+            100,
+        ),
+        (
+            "zone.csv",
+            "2024-03-12T11:26:40.01Z..13:26:40.0199+02:00",
+            "0.01",
+            100,
+        ),
+        ("zone.csv", "13:26:40.01..13:26:40.0199", "0.01", 100),
     ] {
         let ran = folder.run(&["extract", name, "--range", range]);
         assert_eq!(ran.code, 0, "{name} {range}: {}", ran.stderr);
@@ -643,6 +666,9 @@ fn a_range_is_taken_by_any_clock() {
         "{}",
         ran.stderr
     );
+    folder
+        .run(&["extract", "clock.csv", "--range", "13:26:40Z.."])
+        .says(1, &["time zone", "without a zone"]);
     folder
         .run(&["extract", "zero.csv", "--range", "5..6"])
         .says(1, &["no sample", "0.0399"]);

@@ -132,6 +132,7 @@ impl Opened {
         let stand = stand::read(&args.stand)?;
         refuse_derivative(&stand)?;
         let record = &args.record;
+        stand.refuse_late_start(&record.reading)?;
         let input = Input::of(record.input());
         let stream = ChannelStream::open(&input, &record.choice, &record.reading)?;
         if stream.channel.is_compensated {

@@ -31,7 +31,9 @@ pub fn run(args: &Diagnose) -> Result<Outcome, Failure> {
         None => None,
         Some(path) => {
             let (name, text) = stand::text(path)?;
-            Some((stand::parse(&name, &text)?, text))
+            let stand = stand::parse(&name, &text)?;
+            stand.refuse_late_start(&args.reading)?;
+            Some((stand, text))
         }
     };
     let records = args.records();

@@ -58,6 +58,7 @@ pub(super) struct SimulateReport {
 /// If the work cannot be done.
 pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
     let stand = stand::read(&args.stand)?;
+    stand.refuse_late_start(&args.reading)?;
     if args.json && args.result.is_stdout() {
         return Err(Failure::usage(
             ErrorCode::ConflictingArguments,

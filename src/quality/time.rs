@@ -238,7 +238,7 @@ fn rounded_stamps(whose: &str, rounded: &Rounded, axis: &TimeAxis, has_gaps: boo
              together they give {} Hz{allowed}{}",
             number(rounded.quantum_s, 3),
             number(1.0 / rounded.step_s, 9),
-            same_stamps(rounded.quantum_s / rounded.step_s)
+            same_stamps(rounded.quantum_s / rounded.step_s, rounded.quantum_s)
         ),
     )
 }

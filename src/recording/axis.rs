@@ -9,6 +9,7 @@ use torqcomp_dsp::quality::rounding::{Rounded, uniform_line};
 use super::Hole;
 use super::moment::Moment;
 use super::stamps::StampGrid;
+use super::text::ClockOrigin;
 
 /// Largest relative deviation of a step from the typical one in a record with a rate.
 const USUAL: f64 = 0.25;
@@ -70,8 +71,8 @@ pub struct TimeAxis {
     pub(crate) grid: Option<StampGrid>,
     /// For a stream at a given rate, the grid of its additional stamps.
     pub(crate) beside: Option<StampGrid>,
-    /// Origin of the stamps in ns since 1970, or since midnight, if the file gives dates or times of day.
-    pub(crate) clock_ns: Option<i64>,
+    /// What the clock showed at the origin of the stamps, if the file gives dates or times of day.
+    pub(crate) clock: Option<ClockOrigin>,
     /// Rate in the file header, in Hz, used or not.
     pub header_rate_hz: Option<f64>,
     /// Assumption about the axis that should be confirmed before results rely on it:

@@ -6,8 +6,9 @@ use torqcomp_decimal::digits;
 use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
 use torqcomp_model::Unit;
 
-use super::axis::{REVERSED, UNIFORM, falls, step_of};
+use super::axis::{REVERSED, falls, step_of};
 use super::moment::Moment;
+use super::stamps::{TOLERABLE, refuse_shared_stamps};
 use super::text::CELLS_WITH_UNITS;
 use super::{Channel, Hole, HoleKind, RateFrom, Recording, check_holes, check_size, formats};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
@@ -219,8 +220,10 @@ pub(crate) fn unit_of(
 /// A warning if a given rate contradicts the stamps.
 pub(crate) fn overridden(reading: &Reading, stamps_in: &str, stamps_s: &[f64]) -> Option<Warning> {
     let rate_hz = reading.rate_hz.filter(|_| !reading.resample)?;
-    let stamped_hz = 1.0 / step_of(stamps_s, 0.0)?.step;
-    if (rate_hz / stamped_hz - 1.0).abs() <= UNIFORM {
+    let stamped = step_of(stamps_s, 0.0)?;
+    let stamped_hz = 1.0 / stamped.step;
+    let uncertain = 3.0 * stamped.rate_std_hz(stamped_hz).unwrap_or(0.0) / stamped_hz;
+    if (rate_hz / stamped_hz - 1.0).abs() <= uncertain.max(TOLERABLE) {
         return None;
     }
     Some(Warning::new(
@@ -315,6 +318,10 @@ impl Recording {
             ));
         }
         let stamps = axis.stamps_s.as_ref();
+        if let (Some(stamps_s), Some(rate_hz), true) = (stamps, axis.rate_hz, reading.resample) {
+            let origin_s = axis.origin_ns as f64 * 1e-9;
+            refuse_shared_stamps(stamps_s, 1.0 / rate_hz, origin_s, 1.0)?;
+        }
         let name = axis.stamps_in.as_deref().unwrap_or("time");
         warnings.extend(stamps.and_then(|stamps_s| overridden(reading, name, stamps_s)));
         let is_of_stamps =

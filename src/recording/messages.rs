@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::choice::{self, Label, by_name};
 use super::moment::Moment;
+use super::text::ClockOrigin;
 use super::{Channel, Recording, TimeAxis};
 use crate::failure::Failure;
 use crate::io::mcap::{
@@ -50,7 +51,7 @@ pub(super) fn read(
         let heading = clock(&selected.time);
         let mut axis =
             TimeAxis::of_stamps_after(origin_ns.unwrap_or(0), &heading, Arc::new(stamps_s));
-        axis.clock_ns = origin_ns;
+        axis.clock = origin_ns.map(ClockOrigin::utc);
         axis.start_text = axis.start.and_then(Moment::date);
         recording.channels.push(Channel {
             samples,

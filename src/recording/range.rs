@@ -59,17 +59,24 @@ impl TimeBound {
             }
             Self::Seconds { ns, .. } => ns.saturating_sub(axis.origin_ns) as f64 * 1e-9,
             Self::Clock(clock) => {
-                let zero_ns = axis.clock_ns.ok_or_else(|| {
+                let origin = axis.clock.ok_or_else(|| {
                     Failure::failed(
                         ErrorCode::RangeEmpty,
                         "the record has no dates or times of day; give --range in seconds, as 0.5..2",
                     )
                 })?;
+                let total_ns = clock.total_in_zone_of(origin).ok_or_else(|| {
+                    Failure::failed(
+                        ErrorCode::RangeEmpty,
+                        "--range gives a time zone, but the record's times have none; give the times of --range as the \
+                         record's clock shows them, without a zone",
+                    )
+                })?;
                 match clock.day {
-                    Some(_) => clock.total().saturating_sub(zero_ns) as f64 * 1e-9,
+                    Some(_) => total_ns.saturating_sub(origin.ns) as f64 * 1e-9,
                     None => {
-                        let first_ns = zero_ns.saturating_add((start.after_s * 1e9) as i64);
-                        let after_ns = (clock.total() - first_ns).rem_euclid(DAY);
+                        let first_ns = origin.ns.saturating_add((start.after_s * 1e9) as i64);
+                        let after_ns = (total_ns - first_ns).rem_euclid(DAY);
                         // Shortly before the record rather than a day after it.
                         let is_before = after_ns > DAY / 2;
                         start.after_s + (after_ns - if is_before { DAY } else { 0 }) as f64 * 1e-9

@@ -19,7 +19,7 @@ pub(crate) const COARSE_STAMPS: f64 = 0.25;
 /// Relative uncertainty of the rate of rounded stamps above which the user is asked. With an error of 0.2 %, the
 /// inverse response of a stand with a damping ratio of 0.02 has a relative error of 0.002/0.02 = 10 % at the resonance.
 /// That is the worst case: a rate of few digits is found exactly.
-const TOLERABLE: f64 = 2e-3;
+pub(super) const TOLERABLE: f64 = 2e-3;
 /// Limits of a resampled rate relative to the recorded one.
 const RESAMPLED_RATES: (f64, f64) = (0.9, 1.4);
 
@@ -55,8 +55,27 @@ pub(super) struct MissingSamples {
 /// Maximum number of copies of a row: more rows with one stamp indicate a coarse clock.
 const MOST_COPIES: f64 = 4.0;
 
-/// Possible reasons for each stamp being in `rows` rows, if that is a whole number.
-pub(crate) fn same_stamps(rows: f64) -> String {
+/// Number of samples with one stamp above which resampling would lose most of them.
+const SHARED: f64 = 1.5;
+/// Largest fraction of rows missing or written twice that explains rounded stamps as well as another rate.
+const ODD_ROWS: f64 = 0.1;
+
+/// Other possible reasons for rounded stamps that are in `rows` rows on average: every row written several times if that
+/// is a whole number; a few rows missing or written twice if it is nearly one.
+pub(crate) fn same_stamps(rows: f64, quantum_s: f64) -> String {
+    let odd = (rows - 1.0).abs();
+    if (1e-6..ODD_ROWS).contains(&odd) {
+        let (which, remedy) = match rows < 1.0 {
+            true => ("is missing", "--fill linear"),
+            false => ("was written twice", "--resample"),
+        };
+        return format!(
+            "; the same stamps result at {} Hz if one row in {} {which}: compare the recorder's rate, and give {remedy} if \
+             it is that one",
+            digits::text(1.0 / quantum_s, 6),
+            digits::text(1.0 / odd, 3),
+        );
+    }
     let whole = rows.round();
     match (2.0..=MOST_COPIES).contains(&whole) && (rows / whole - 1.0).abs() < 1e-6 {
         true => format!(
@@ -64,6 +83,33 @@ pub(crate) fn same_stamps(rows: f64) -> String {
              times, and only one of each belongs to the record"
         ),
         false => String::new(),
+    }
+}
+
+/// Rejects resampling where several samples share each stamp because of its rounding: all but one of each would be lost.
+/// `of_seconds`: seconds per unit of the stamps.
+///
+/// # Errors
+/// If the stamps are rounded to much more than their step.
+pub(super) fn refuse_shared_stamps(
+    stamps: &[f64],
+    step: f64,
+    origin: f64,
+    of_seconds: f64,
+) -> Result<(), Failure> {
+    let rounded = rounding(stamps, step, origin);
+    match rounded.filter(|line| line.quantum_s > SHARED * line.step_s) {
+        Some(line) => Err(Failure::failed(
+            ErrorCode::IrregularTime,
+            format_args!(
+                "the time stamps are rounded to {} s, and {} samples on average share one; --resample would keep only one \
+                 of them: omit it, and the samples are placed at the {} Hz that all stamps together give",
+                digits::text(line.quantum_s * of_seconds, 3),
+                digits::text(line.quantum_s / line.step_s, 3),
+                digits::text(1.0 / (line.step_s * of_seconds), 7),
+            ),
+        )),
+        None => Ok(()),
     }
 }
 
@@ -96,6 +142,9 @@ impl TimeAxis {
             .ok_or_else(|| Failure::failed(ErrorCode::IrregularTime, no_step(heading, first)))?;
         let typical = sharpened(typical, first, later, origin).unwrap_or(typical);
         grid.resampled = reading.resample;
+        if reading.resample {
+            refuse_shared_stamps(first, typical.step, origin, grid.seconds_per_unit)?;
+        }
         grid.step = match reading.rate_hz {
             None => typical.step,
             Some(rate_hz) => {
@@ -223,7 +272,7 @@ impl StampGrid {
                     digits::text(self.quantum * of_seconds, 3),
                     digits::text(rate_hz, 9),
                     digits::text(rate_hz * self.quantum / span, 2),
-                    same_stamps(self.quantum / self.step),
+                    same_stamps(self.quantum / self.step, self.quantum * of_seconds),
                 ),
             )
         })

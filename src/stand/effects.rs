@@ -11,6 +11,7 @@ use super::Stand;
 use super::section::Section;
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::Motion;
+use crate::io::Reading;
 
 /// Unit of the record of a stand without a static gain.
 const TORQUE: &str = "N m";
@@ -126,6 +127,26 @@ fn value(
 }
 
 impl Stand {
+    /// Rejects a part of a record that starts later, if an effect counts time from the start of the record.
+    ///
+    /// # Errors
+    /// If both are given.
+    pub(crate) fn refuse_late_start(&self, reading: &Reading) -> Result<(), Failure> {
+        let is_timed = |link: &Link| matches!(&link.action, Action::Distortion(distortion) if distortion.is_timed());
+        let mut links = self.effects.iter().map(DeclaredEffect::link);
+        match links.find(is_timed).filter(|_| reading.starts_later()) {
+            Some(link) => Err(self.failed(
+                ErrorCode::UnsuitableRecord,
+                format_args!(
+                    "\"{}\" depends on the time since the record began, and --range leaves out its beginning; use the \
+                     whole record, or only the end of --range, as ..2",
+                    link.effect
+                ),
+            )),
+            None => Ok(()),
+        }
+    }
+
     /// Record unit of the stand's mechanics: that of the static gain, or torque.
     #[must_use]
     pub fn recorded_unit(&self) -> &str {

@@ -88,13 +88,13 @@ fn by_shapes(read: &mut [ReadMode]) -> Result<(), Failure> {
         mode.mode.values[2] = part[0] / residues;
         mode.mode.at_gage = Some(part[1] / at_gage);
         mode.mode.has_shape = true;
-        let relative = mode
-            .shape
-            .iter()
-            .flatten()
-            .filter_map(Estimate::relative_std);
-        let relative = relative.reduce(f64::hypot);
-        mode.mode.stds[2] = relative.map(|std| (std * mode.mode.values[2]).abs());
+        let scale = mode.mode.values[0].powi(2) * residues;
+        let stds = mode.shape.as_ref().map(|[load, gage]| {
+            let part = |a: &Estimate, b: &Estimate| Some(a.std_uncertainty()? * b.value() / scale);
+            [part(load, gage), part(gage, load)]
+        });
+        let both = stds.into_iter().flatten().flatten();
+        mode.mode.stds[2] = both.reduce(f64::hypot).map(f64::abs);
     }
     Ok(())
 }
@@ -208,10 +208,21 @@ impl DeclaredMode {
         found.map(|(_, value)| value).sum()
     }
 
-    /// The same with one number changed by a multiple of its standard uncertainty.
-    pub(super) fn moved(&self, number: usize, by: f64) -> Option<Self> {
-        let mut moved = self.clone();
-        moved.values[number] += by * self.stds[number]?;
+    /// All modes with one number of one of them, by its index among those of all, changed by a multiple of its standard
+    /// uncertainty. Residues that follow from mode shapes change with the frequency, and add up to 1 again.
+    pub(super) fn all_moved(modes: &[Self], of_all: usize, by: f64) -> Option<Vec<Self>> {
+        let (place, number) = Self::place(of_all);
+        let mut moved = modes.to_vec();
+        let mode = &mut moved[place];
+        let before_hz = mode.values[0];
+        mode.values[number] += by * mode.stds[number]?;
+        if mode.has_shape {
+            mode.values[2] *= (before_hz / mode.values[0]).powi(2);
+            let sum: f64 = moved.iter().map(|mode| mode.values[2]).sum();
+            for mode in &mut moved {
+                mode.values[2] /= sum;
+            }
+        }
         Some(moved)
     }
 }
@@ -257,6 +268,31 @@ mod tests {
             .map(|p| (p.residue, p.at_gage))
             .collect();
         assert_eq!(got, [(2.0, Some(0.5)), (-1.0, Some(0.5))]);
+    }
+
+    /// A single mode carries all of the static response, whatever its shape.
+    #[test]
+    fn uncertain_shapes_of_one_mode_do_not_matter() {
+        let text = "[[modes]]\nnatural_frequency = \"100 Hz\"\ndamping_ratio = 0.01\n\
+                    shape_at_load = { value = 2, std = 0.02 }\nshape_at_gage = { value = 1, std = 0.02 }\n";
+        let std = read(text).unwrap().inverse_uncertainty(150.0).unwrap();
+        assert!(std.magnitude_relative < 1e-12, "{std:?}");
+    }
+
+    /// `r₁ = a/(a + b)` with `a = 2·1/1`, `b = 1·2/4`, and a standard uncertainty of `a` of 1 %: `r₁` is 0.8 and changes
+    /// by `0.8 · 0.2 · 1 %`, `r₂` by as much the other way. At 150 Hz without damping, `H = r₁/(1 − 2.25) + r₂/(1 −
+    /// 0.5625)` is −0.64 + 0.457143.
+    #[test]
+    fn uncertain_shapes_of_two_modes_shift_the_response_between_them() {
+        let text = two(
+            "shape_at_load = { value = 2, std = 0.02 }\nshape_at_gage = 1",
+            "shape_at_load = 1\nshape_at_gage = 2",
+        )
+        .replace("0.01", "0.0");
+        let std = read(&text).unwrap().inverse_uncertainty(150.0).unwrap();
+        let expected = 0.0016 * (1.0 / 1.25 + 1.0 / 0.4375) / (0.64 - 0.457_143);
+        let relative = std.magnitude_relative / expected;
+        assert!((relative - 1.0).abs() < 1e-4, "{std:?}, {expected}");
     }
 
     #[test]

@@ -296,9 +296,7 @@ impl Mechanics {
 impl Mechanics {
     /// The mechanics with one number of their modes changed.
     fn with_modes(&self, modes: &[DeclaredMode], place: usize, side: f64) -> Option<Self> {
-        let (mode, number) = DeclaredMode::place(place);
-        let mut modes = modes.to_vec();
-        modes[mode] = modes[mode].moved(number, side)?;
+        let modes = DeclaredMode::all_moved(modes, place, side)?;
         let parts = modes.iter().map(DeclaredMode::part).collect();
         Some(Self {
             response: StandResponse::Modes(ModalResponse::new(parts).ok()?),

@@ -14,7 +14,7 @@ use crate::Error;
 use crate::spectrum::Density;
 
 pub use choice::{BandChoice, BandSearch, band_of_stand};
-pub use lines::DecidingLines;
+pub use lines::{Deciding, DecidingLines};
 
 /// Shape of the Kaiser window for the edge: the filter's tail is down to `e^{-26} ≈ 5·10⁻¹²`.
 const EDGE_BETA: f64 = 26.0;

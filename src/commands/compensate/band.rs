@@ -2,7 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use torqcomp_dsp::band::{Band, BandSearch, DecidingLines, band_of_stand};
+use torqcomp_dsp::band::{Band, BandSearch, Deciding, DecidingLines, band_of_stand};
 use torqcomp_dsp::compensate::Inverse;
 use torqcomp_dsp::quality::repeats::repeats;
 
@@ -156,9 +156,13 @@ impl BandReport {
         if of_lines < MATTERS * rms {
             return None;
         }
-        let which = match lines.count {
-            1 => "the line".to_owned(),
-            count => format!("{count} lines, the strongest"),
+        let which = match lines.what {
+            Deciding::Lines(1) => "the line".to_owned(),
+            Deciding::Lines(count) => format!("{count} lines, the strongest"),
+            Deciding::From(from_hz) => format!(
+                "what it contains above {} Hz, far above the rest, with its strongest line",
+                rounded(from_hz, 3)
+            ),
         };
         Some(Warning::new(
             "lines-decide-band",

@@ -25,7 +25,47 @@ pub struct Clock {
     pub ahead_s: Option<i32>,
 }
 
+/// The time that a clock showed at the origin of stamps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ClockOrigin {
+    /// Nanoseconds since 1970, or since midnight, in its time zone.
+    pub ns: i64,
+    /// Offset of its time zone from UTC in seconds, if known.
+    pub ahead_s: Option<i32>,
+}
+
+impl ClockOrigin {
+    /// Nanoseconds since 1970 in UTC.
+    #[must_use]
+    pub fn utc(ns: i64) -> Self {
+        Self {
+            ns,
+            ahead_s: Some(0),
+        }
+    }
+}
+
 impl Clock {
+    /// What this clock showed, as the origin of stamps.
+    #[must_use]
+    pub fn as_origin(self) -> ClockOrigin {
+        ClockOrigin {
+            ns: self.total(),
+            ahead_s: self.ahead_s,
+        }
+    }
+
+    /// Nanoseconds since 1970, or since midnight, on a clock in the zone of another origin. `None` if only this one's
+    /// zone is known.
+    #[must_use]
+    pub fn total_in_zone_of(self, origin: ClockOrigin) -> Option<i64> {
+        let Some(own) = self.ahead_s else {
+            return Some(self.total());
+        };
+        let ahead_s = i64::from(origin.ahead_s?) - i64::from(own);
+        Some(self.total() + ahead_s * SECOND)
+    }
+
     /// Parses a cell that contains nothing else.
     ///
     /// ```

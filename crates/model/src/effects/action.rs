@@ -149,6 +149,11 @@ pub trait Distortion: Send + Sync {
     fn is_pointwise(&self) -> bool {
         false
     }
+
+    /// Whether it depends on the time since the record began.
+    fn is_timed(&self) -> bool {
+        false
+    }
 }
 
 /// Memory of a torque, carried from node to node.

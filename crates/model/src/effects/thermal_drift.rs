@@ -99,6 +99,10 @@ impl<F: Fn(f64) -> f64 + Send + Sync> Distortion for Drift<F> {
     fn treatment(&self) -> Treatment {
         Treatment::Subtracted
     }
+
+    fn is_timed(&self) -> bool {
+        true
+    }
 }
 
 /// `y = (1 + g t) x`.
@@ -118,6 +122,10 @@ impl Distortion for Sensitivity {
             *sample *= (1.0 + self.rate_per_s * clock.time_s(i)).recip();
         }
         Unrecovered::default()
+    }
+
+    fn is_timed(&self) -> bool {
+        true
     }
 }
 

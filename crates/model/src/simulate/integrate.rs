@@ -159,10 +159,13 @@ impl LinearStep {
     pub(super) fn advance(&self, state: MotionState, input: &[f64]) -> MotionState {
         let [u, v, w, z] = *input.first_chunk().expect("four nodes");
         let [to_u, to_v, to_w, to_z] = self.of_input;
-        let [x, speed] = std::array::from_fn(|k| {
+        // Not `array::from_fn`, which becomes a call per number here.
+        let mut next = [0.0; 2];
+        for k in 0..2 {
             let force = to_u[k] * u + to_v[k] * v + to_w[k] * w + to_z[k] * z;
-            self.of_x[k] * state.x + (self.of_speed[k] * state.speed + force)
-        });
+            next[k] = self.of_x[k] * state.x + (self.of_speed[k] * state.speed + force);
+        }
+        let [x, speed] = next;
         MotionState { x, speed }
     }
 }

@@ -43,7 +43,7 @@ struct SteppedMode {
     step: LinearStep,
     /// `g`; 0 where no torque acts.
     at_gage: f64,
-    /// `ω² g`: acceleration by a unit torque at the gage.
+    /// `ω² g/Σ ω² g`: the change of its speed when a torque changes that of the gage by 1.
     pushed_by: f64,
     /// `v`, and `v'` without `q ω G u`.
     motion: MotionState,
@@ -82,11 +82,15 @@ impl<'a> Stepped<'a> for ModalIntegrator<'a> {
             }
         };
         let parts = motion.stand.parts().iter();
-        let modes: Vec<SteppedMode> = parts.zip(&motion.progress.modes).map(stepped).collect();
+        let mut modes: Vec<SteppedMode> = parts.zip(&motion.progress.modes).map(stepped).collect();
+        let acceleration: f64 = modes.iter().map(|mode| mode.pushed_by).sum();
+        for mode in &mut modes {
+            mode.pushed_by /= acceleration;
+        }
         let turned = |part: &ModalPart| part.quadrature * part.mode.omega_rad_s;
         let memories = motion.progress.memories.iter().copied();
         let run = Self {
-            impulse: step_s * modes.iter().map(|mode| mode.pushed_by).sum::<f64>(),
+            impulse: step_s * acceleration,
             modes,
             direct: motion.stand.residual() * gain,
             direct_speed: gain * motion.stand.parts().iter().map(turned).sum::<f64>(),
@@ -138,9 +142,9 @@ impl ModalIntegrator<'_> {
     fn kick(&mut self, moved: MotionState, change: f64) -> MotionState {
         let kicked = kicked(&mut self.acting, moved, self.shift, change, self.impulse);
         if kicked.speed != moved.speed {
-            let each = (kicked.speed - moved.speed) * self.step_s / self.impulse;
+            let change = kicked.speed - moved.speed;
             for mode in &mut self.modes {
-                mode.motion.speed += each * mode.pushed_by;
+                mode.motion.speed += change * mode.pushed_by;
             }
         }
         kicked

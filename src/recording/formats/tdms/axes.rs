@@ -11,7 +11,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
 use crate::recording::formats::{Content, NAMED, channel, names_left_out, plausible_rate, stamped};
 use crate::recording::moment::{Moment, date_and_time};
-use crate::recording::text::is_time_name;
+use crate::recording::text::{ClockOrigin, is_time_name};
 use crate::recording::{TimeAxis, without_rounding};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
@@ -239,8 +239,9 @@ fn of_waveform(object: &TdmsObject, first_ns: Option<i64>) -> Option<TimeAxis> {
         (later, offset) => Some(later.unwrap_or(0.0) + offset.unwrap_or(0.0)),
     };
     let mut axis = TimeAxis::of_header("wf_increment", rate_hz, start_s);
-    axis.clock_ns = first_ns.filter(|_| start_ns.is_some());
-    axis.start_text = axis.clock_ns.and_then(|origin_ns| {
+    let origin_ns = first_ns.filter(|_| start_ns.is_some());
+    axis.clock = origin_ns.map(ClockOrigin::utc);
+    axis.start_text = origin_ns.and_then(|origin_ns| {
         let after_s = start_s.unwrap_or(0.0);
         Moment { origin_ns, after_s }.date()
     });
@@ -254,7 +255,7 @@ fn of_times(times: &ScaledChannel, reading: &Reading) -> Result<TimeAxis, Failur
         let all = times.object.times_ns.iter();
         let stamps = all.map(|ns| ns.wrapping_sub(*first_ns) as f64 * 1e-9);
         let mut axis = TimeAxis::of_stamps(&name, Arc::new(stamps.collect()));
-        axis.clock_ns = Some(*first_ns);
+        axis.clock = Some(ClockOrigin::utc(*first_ns));
         axis.start_text = date_and_time(*first_ns);
         return Ok(axis);
     }

@@ -108,7 +108,7 @@ impl AxisRule {
         };
         if let Some(rule) = &self.stamps {
             axis.holes.clone_from(&columns[rule.place].holes);
-            axis.clock_ns = rule.clock_ns;
+            axis.clock = rule.clock;
         }
         axis.header_rate_hz = self.header.as_ref().map(|(_, hz)| *hz);
         self.prefer_header(&mut axis);

@@ -3,7 +3,7 @@
 use super::groups::Group;
 use super::{SAME, Sources, is_counting};
 use crate::failure::{ErrorCode, Failure};
-use crate::recording::text::clock::{Clock, unwrap_midnights};
+use crate::recording::text::clock::{Clock, ClockOrigin, unwrap_midnights};
 use crate::recording::text::rows::{Column, ColumnKind};
 use crate::recording::text::units;
 use crate::recording::text::vocabulary::has;
@@ -24,8 +24,8 @@ pub struct StampRule {
     pub unit: &'static str,
     /// Origin of its values in ns.
     pub origin_ns: i64,
-    /// Origin of its values in ns since 1970, or since midnight, if they are dates or times of day.
-    pub clock_ns: Option<i64>,
+    /// What the clock showed at the origin of its values, if they are dates or times of day.
+    pub clock: Option<ClockOrigin>,
     /// Whether they are times of day, which restart at midnight.
     pub is_time_of_day: bool,
     /// The column with the fractional seconds of each stamp, if separate.
@@ -83,7 +83,7 @@ impl StampRule {
             seconds_per_unit: 1.0,
             unit: "s",
             origin_ns: 0,
-            clock_ns: None,
+            clock: None,
             is_time_of_day: false,
             parts: None,
             is_sum: false,
@@ -186,7 +186,7 @@ impl Sources<'_> {
             .find_map(|p| self.clock_texts[*p].as_ref());
         StampRule {
             is_time_of_day: first.day.is_none(),
-            clock_ns: Some(first.total()),
+            clock: Some(first.as_origin()),
             parts: milliseconds,
             start_text: Some(match date.filter(|_| first.day.is_none()) {
                 Some(date) => format!("{date} {text}"),
@@ -208,7 +208,7 @@ impl Sources<'_> {
         let origin_ns = ((origin + parts.whole) * 1e9) as i64;
         Some(StampRule {
             origin_ns,
-            clock_ns: Some(origin_ns).filter(|ns| *ns != 0),
+            clock: Some(ClockOrigin::utc(origin_ns)).filter(|_| origin_ns != 0),
             parts: Some(parts),
             ..StampRule::of_seconds(&self.fields[place].heading, place)
         })
@@ -269,7 +269,7 @@ impl Sources<'_> {
             seconds_per_unit,
             unit: name_of_unit(seconds_per_unit),
             origin_ns,
-            clock_ns: Some(origin_ns).filter(|ns| *ns != 0),
+            clock: Some(ClockOrigin::utc(origin_ns)).filter(|_| origin_ns != 0),
             assumed,
             ..StampRule::of_seconds(&field.heading, place)
         }))
