@@ -74,7 +74,8 @@ pub fn residual(
                 .to_owned(),
         );
     }
-    if matches!(verdict, Verdict::Unexplained | Verdict::PartlyExplained) {
+    let is_open = matches!(verdict, Verdict::Unexplained | Verdict::PartlyExplained);
+    if is_open && !found.is_noise(&found.before) {
         parts.extend(level_dependence(levels));
     }
     let line = |line: &SpectralLine| format!("a line at {} Hz", rounded(line.frequency_hz, 5));
@@ -84,10 +85,7 @@ pub fn residual(
 
 /// An error that only the training records show.
 fn in_training(found: &SearchState) -> Option<String> {
-    if !found.after.effect_names().is_empty() {
-        return None;
-    }
-    let ratio = found.left_in_training()?;
+    let ratio = found.left_in_training(&found.after)?;
     Some(format!(
         "{} times the noise in the training records: something acts there that the hold-out records do not show",
         rounded(ratio, 3)
@@ -199,6 +197,12 @@ pub fn next_experiment(
         return Some(
             "the same record twice, cold and after an hour of running, and once at half the level: do the constants or the \
              noise differ?"
+                .to_owned(),
+        );
+    }
+    if found.left_in_training(&found.after).is_some() {
+        return Some(
+            "a held-out record at the level of the training records, as only these show the rest"
                 .to_owned(),
         );
     }

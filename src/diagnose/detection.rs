@@ -90,13 +90,14 @@ fn moments(record: &StandRecord, frequency_hz: f64) -> SpikeMoments {
     SpikeMoments {
         moment: record.range.start as f64,
         period: record.rate_hz() / frequency_hz,
+        is_smooth: false,
     }
 }
 
 /// Spikes of one sample over the range of a record, with its weights.
 fn spikes(record: &StandRecord, frequency_hz: f64, amplitude: f64) -> Vec<f64> {
     let moments = moments(record, frequency_hz);
-    let one = SpikeShape::of(&[amplitude]);
+    let one = SpikeShape::of(moments, &[amplitude]);
     record.weighted(one.train(moments, record.range.clone()).collect())
 }
 

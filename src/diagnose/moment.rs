@@ -68,6 +68,12 @@ pub struct ChangedConstant {
     pub after_std: Option<f64>,
 }
 
+/// What is fitted to each part: the stand with the effects that are known, and its values to start from.
+struct Base {
+    structure: Structure,
+    values: Vec<f64>,
+}
+
 /// A split record, with a stand for each part.
 struct CutRecord {
     /// First sample of the second part.
@@ -76,9 +82,9 @@ struct CutRecord {
 }
 
 impl CutRecord {
-    fn of(context: &Arc<FitContext>, record: &StandRecord, at: usize) -> Option<Self> {
+    fn of(base: &Base, record: &StandRecord, at: usize) -> Option<Self> {
         let [first, second] = parts(record, at);
-        let stands = [stand_of(context, &first)?, stand_of(context, &second)?];
+        let stands = [base.stand_of(&first)?, base.stand_of(&second)?];
         Some(Self { at, stands })
     }
 
@@ -98,12 +104,7 @@ impl CutRecord {
 
     /// The same with the split where the residual is smallest: the motion takes some periods to become that of the
     /// second stand, during which the first one fits better.
-    fn placed(
-        self,
-        context: &Arc<FitContext>,
-        record: &StandRecord,
-        shortest: usize,
-    ) -> Option<Self> {
+    fn placed(self, base: &Base, record: &StandRecord, shortest: usize) -> Option<Self> {
         let (mut at, mut sum) = (self.at, self.sum());
         let mut step = shortest / 2;
         while step > 0 {
@@ -117,7 +118,7 @@ impl CutRecord {
                 _ => step /= 2,
             }
         }
-        Self::of(context, record, at)
+        Self::of(base, record, at)
     }
 }
 
@@ -129,14 +130,14 @@ impl SearchState {
     /// The change that explains most of the residual of a single stand, which is then not due to a law of the
     /// motion.
     pub(super) fn settle_change(&mut self) -> Option<ChangedStand> {
-        let plain = &self.before.fitted;
-        let context = &plain.structure.context;
-        if context.held.is_some() {
+        if self.before.fitted.structure.context.held.is_some() {
             return None;
         }
-        let mut context = FitContext::clone(&context.at(plain.stand()));
-        context.gain_is_free = true;
-        let context = Arc::new(context);
+        // A change beside an effect is one only together with it.
+        let mut bases = vec![Base::of(&self.before.fitted)];
+        if !self.after.effect_names().is_empty() {
+            bases.push(Base::of(&self.after.fitted));
+        }
         let noise_rms = noise_rms(self.noise_floor);
         let mut records: Vec<&StandRecord> = Vec::new();
         for record in self.records.train.iter().chain(&self.records.holdout) {
@@ -145,34 +146,34 @@ impl SearchState {
                 records.push(record);
             }
         }
-        let changes = records.into_iter().filter_map(|record| {
-            let whole = record.part(0..record.measured.len());
-            change_in(&context, &whole, noise_rms)
+        let changes = bases.iter().find_map(|base| {
+            let changes = records.iter().filter_map(|record| {
+                let whole = record.part(0..record.measured.len());
+                change_in(base, &whole, noise_rms)
+            });
+            changes.min_by(|a, b| a.0.total_cmp(&b.0))
         });
-        let (_, change) = changes.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (_, change) = changes?;
         self.suspected = None;
         Some(change)
     }
 }
 
 /// A change within a record, with the fraction of the error power above the noise that remains.
-fn change_in(
-    context: &Arc<FitContext>,
-    record: &StandRecord,
-    noise_rms: f64,
-) -> Option<(f64, ChangedStand)> {
+fn change_in(base: &Base, record: &StandRecord, noise_rms: f64) -> Option<(f64, ChangedStand)> {
+    let context = &base.structure.context;
     let count = record.measured.len();
     let turns = SHORTEST_TURNS * record.rate_hz() / context.plain.natural_hz;
     let shortest = (turns.ceil() as usize).max(count / 50);
     if count < 2 * shortest {
         return None;
     }
-    let one = stand_of(context, record)?;
+    let one = base.stand_of(record)?;
     let cuts = CUTS.into_iter();
     let cuts =
-        cuts.filter_map(|cut| settled(context, record, (cut * count as f64) as usize, shortest));
+        cuts.filter_map(|cut| settled(base, record, (cut * count as f64) as usize, shortest));
     let best = cuts.min_by(|a, b| a.sum().total_cmp(&b.sum()))?;
-    let best = best.placed(context, record, shortest)?;
+    let best = best.placed(base, record, shortest)?;
     let power = |sum: f64| sum / count as f64;
     let above = |sum: f64| power(sum) - noise_rms * noise_rms;
     let share = above(best.sum()) / above(one.train_sum);
@@ -192,29 +193,36 @@ fn change_in(
     Some((share, change))
 }
 
-fn stand_of(context: &Arc<FitContext>, record: &StandRecord) -> Option<FittedModel> {
-    let values = context.plain_values(&context.plain);
-    fit(
-        Structure::plain(context.clone()),
-        &values,
-        std::slice::from_ref(record),
-        FIT,
-    )
-    .ok()
+impl Base {
+    fn of(fitted: &FittedModel) -> Self {
+        let context = FitContext {
+            plain: fitted.stand(),
+            gain_is_free: true,
+            ..FitContext::clone(&fitted.structure.context)
+        };
+        let mut values = context.plain_values(&context.plain);
+        let of_effects = fitted.structure.context.plain_count();
+        values.extend(&fitted.values[of_effects..]);
+        let structure = Structure {
+            context: Arc::new(context),
+            ..fitted.structure.clone()
+        };
+        Self { structure, values }
+    }
+
+    fn stand_of(&self, record: &StandRecord) -> Option<FittedModel> {
+        let record = std::slice::from_ref(record);
+        fit(self.structure.clone(), &self.values, record, FIT).ok()
+    }
 }
 
 /// The converged split, from an initial one.
-fn settled(
-    context: &Arc<FitContext>,
-    record: &StandRecord,
-    mut at: usize,
-    shortest: usize,
-) -> Option<CutRecord> {
+fn settled(base: &Base, record: &StandRecord, mut at: usize, shortest: usize) -> Option<CutRecord> {
     let count = record.measured.len();
     let mut best: Option<CutRecord> = None;
     for _ in 0..ROUNDS {
         at = at.clamp(shortest, count - shortest);
-        let now = CutRecord::of(context, record, at)?;
+        let now = CutRecord::of(base, record, at)?;
         let next = least(&now.stands, record)?;
         let is_better = best.as_ref().is_none_or(|best| now.sum() < best.sum());
         if !is_better {

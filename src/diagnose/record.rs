@@ -19,8 +19,8 @@ pub struct InitialState {
     pub motion: MotionState,
     /// Displacement under a constant load that is not in the input.
     pub preload: f64,
-    /// Moment of a spike of the model's train, in samples from the first; `None` if the record shows no train.
-    pub spike: Option<f64>,
+    /// Moments of the spikes of the model's train, in samples from the first; `None` if the record shows no train.
+    pub spikes: Option<SpikeMoments>,
 }
 
 impl InitialState {
@@ -115,6 +115,8 @@ pub struct Nuisance {
     modes: Vec<(usize, f64)>,
     /// Indices of the columns of a train of spikes.
     spikes: Range<usize>,
+    /// The moments of those spikes.
+    spike_moments: Option<SpikeMoments>,
     /// Index of the first column of the lines.
     lines: usize,
 }
@@ -230,12 +232,15 @@ impl StandRecord {
 
     /// The record with the moments of the spikes that its weighted residual shows.
     pub fn with_spikes(mut self, terms: &NuisanceTerms, residual: &[f64]) -> Self {
-        self.initial.spike = terms.spikes_hz.and_then(|spikes_hz| {
+        self.initial.spikes = terms.spikes_hz.and_then(|spikes_hz| {
             let period = self.rate_hz() / spikes_hz;
             let residual = self.without_weights(residual.to_vec());
             let found = SpikeSearch::of(&residual, period).found(period)?;
             let first = self.range.start as f64;
-            (found.share() > 0.0).then_some(first + found.moments.moment)
+            (found.share() > 0.0).then_some(SpikeMoments {
+                moment: first + found.moments.moment,
+                ..found.moments
+            })
         });
         self
     }
@@ -243,8 +248,8 @@ impl StandRecord {
     /// The moments of the spikes of a train at that rate, in samples from the first.
     pub fn spike_moments(&self, spikes_hz: f64) -> Option<SpikeMoments> {
         let period = self.rate_hz() / spikes_hz;
-        let of = |moment| SpikeMoments { moment, period };
-        self.initial.spike.map(of)
+        let of = |own| SpikeMoments { period, ..own };
+        self.initial.spikes.map(of)
     }
 
     /// A weighted residual without its weights.
@@ -319,6 +324,7 @@ impl StandRecord {
             columns.push(self.weighted(column));
         }
         nuisance.spikes = first..columns.count();
+        nuisance.spike_moments = moments;
         nuisance.lines = columns.count();
     }
 
@@ -389,7 +395,11 @@ impl Nuisance {
                 .chunks_exact(2)
                 .map(|c| [c[0], c[1]])
                 .collect(),
-            spikes: SpikeShape::of(&raw[self.spikes.clone()]),
+            spikes: self
+                .spike_moments
+                .map_or_else(SpikeShape::default, |moments| {
+                    SpikeShape::of(moments, &raw[self.spikes.clone()])
+                }),
         }
     }
 }

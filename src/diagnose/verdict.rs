@@ -223,12 +223,12 @@ impl SearchState {
         round.is_some_and(|round| !round.iter().any(CandidateFit::is_confirmed))
     }
 
-    /// The plain stand's error in the training records in terms of their noise, if it is far larger than in the hold-out
+    /// A model's error in the training records in terms of their noise, if it is far larger than in the hold-out
     /// records: an effect of large motion, which smaller motion does not show.
-    pub(super) fn left_in_training(&self) -> Option<f64> {
+    pub(super) fn left_in_training(&self, model: &ScoredModel) -> Option<f64> {
         let holdout = self.noise_floor?;
-        let ratio = self.before.over_noise_in_training(holdout)?;
-        let of_holdout = self.before.compared_rms() / holdout.rms;
+        let ratio = model.over_noise_in_training(holdout)?;
+        let of_holdout = model.compared_rms() / holdout.rms;
         (ratio > MORE_IN_TRAINING * of_holdout.max(1.0)).then_some(ratio)
     }
 
@@ -249,8 +249,21 @@ impl SearchState {
     /// Whether only white noise is left.
     pub(super) fn is_at_noise(&self) -> bool {
         let is_white = self.tests.white && !self.tests.follows_anything();
-        let is_at = |f: NoiseFloor| self.after.compared_rms() <= AT_FLOOR * f.rms;
-        is_white && self.noise_floor.is_some_and(is_at)
+        is_white && self.is_noise(&self.after)
+    }
+
+    /// Whether a model leaves no more than the noise in the hold-out records.
+    pub(super) fn is_noise(&self, model: &ScoredModel) -> bool {
+        let is_at = |f: NoiseFloor| model.compared_rms() <= AT_FLOOR * f.rms;
+        self.noise_floor.is_some_and(is_at)
+    }
+
+    /// Whether only white noise is left, and no more than noise in the training records either.
+    fn is_at_noise_everywhere(&self) -> bool {
+        let ratio = self
+            .noise_floor
+            .and_then(|floor| self.after.over_noise_in_training(floor));
+        self.is_at_noise() && ratio.is_some_and(|ratio| ratio <= AT_FLOOR)
     }
 
     /// Whether the final residual is above the noise, autocorrelated, and depends on the input, however
@@ -280,8 +293,10 @@ impl SearchState {
         let is_left = is_known_left || self.leaves(&self.after, &self.tests);
         if self.after.effect_names().is_empty() {
             let is_left = self.leaves(&self.before, &self.tests_before);
-            let is_left = is_left || self.left_in_training().is_some();
-            let is_missing = is_suspected || is_left || self.is_refuted || is_outdone;
+            let is_left = is_left || self.left_in_training(&self.before).is_some();
+            // What fits noise is not confirmed either.
+            let is_refuted = self.is_refuted && !self.is_at_noise_everywhere();
+            let is_missing = is_suspected || is_left || is_refuted || is_outdone;
             return match is_missing {
                 true => Verdict::Unexplained,
                 false => Verdict::NothingMissing,
@@ -293,7 +308,10 @@ impl SearchState {
                 && self.before.compared_rms() > CLEARLY_ABOVE * floor.rms
         });
         if explained >= NAMED || !is_left && !is_known {
-            let is_left = is_left || self.follows_input() || self.leaves_line();
+            let is_left = is_left
+                || self.follows_input()
+                || self.leaves_line()
+                || self.left_in_training(&self.after).is_some();
             return match is_left || self.imitates() {
                 true => Verdict::PartlyExplained,
                 false => Verdict::Explained,

@@ -6,7 +6,7 @@ use std::ops::Range;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::lines::FoundLine;
-use super::spikes::{LONGEST, STEEP, SpikeMoments, SpikeShape, SpikeTrain};
+use super::spikes::{LONGEST, SAME, SpikeMoments, SpikeShape, SpikeTrain, TERMS, powers};
 
 /// Shortest period in samples: a spike fills at most half of it.
 const SHORTEST_PERIOD: f64 = 8.0;
@@ -23,6 +23,10 @@ const RATES: i32 = 8;
 const DRIFT: f64 = 0.25;
 /// Final resolution of moments and drift, in samples.
 const FINEST: f64 = 1.0 / 256.0;
+/// Drift from a whole period over a record, in samples, up to which that period is tried.
+const MOST_DRIFT: f64 = 1.5;
+/// Part of the power explained that does not matter: 1 % of the spikes.
+const SLIGHT: f64 = 1e-4;
 /// Steps of a moment tried on either side.
 const ASIDE: i32 = 2;
 /// Smallest relative change of a sum of squares that counts.
@@ -30,8 +34,13 @@ const OPEN: f64 = 1e-9;
 /// Least part of a typical spike in the mean one: outliers that happen to be a multiple of a period apart leave most
 /// of the places empty.
 const TYPICAL: f64 = 0.5;
-/// Power of a train, in variances of a sample, that chance reaches at the best of many moments.
-const CHANCE: f64 = 50.0;
+/// Power of a train, in variances of a sample, that chance reaches at the best of many moments beyond one for each
+/// coefficient of its shape.
+const CHANCE: f64 = 30.0;
+/// Power of a record without its train, relative to its unpredictable part, from which it has a signal.
+const SIGNAL: f64 = 4.0;
+/// Power that a further coefficient of a shape must explain.
+const COST: f64 = 4.0;
 /// Periods beside that of a train at which the record shows what its signal reaches, in drifts by a spike's length.
 const BESIDE: std::ops::RangeInclusive<u32> = 2..=5;
 /// Largest plausible size of the spikes of a record, relative to those of the stand.
@@ -66,6 +75,8 @@ impl FoundTrain {
 /// A record in which trains are searched for, with the part of each sample that the preceding ones do not predict:
 /// spikes are not predictable, a smooth signal is (J. Makhoul, Proc. IEEE 63 (1975), 561).
 pub struct SpikeSearch {
+    /// The record without its mean.
+    samples: Vec<f64>,
     /// Coefficients of the prediction error `e`, the first of which is 1.
     filter: Vec<f64>,
     /// `e`, divided by its standard deviation.
@@ -78,11 +89,10 @@ pub struct SpikeSearch {
 /// Sums over the spikes of a record.
 struct Sums {
     count: f64,
-    part: f64,
-    part_square: f64,
-    /// Of the matched record at each sample of a spike, without and with the fraction of a sample as a factor.
-    at: Vec<f64>,
-    with_part: Vec<f64>,
+    /// Of the products of the powers of the fractions of a sample.
+    products: [[f64; TERMS]; TERMS],
+    /// Of the matched record at each sample of a spike, times those powers.
+    at: Vec<[f64; TERMS]>,
 }
 
 impl SpikeSearch {
@@ -93,22 +103,38 @@ impl SpikeSearch {
         let order = ORDER.min((period as usize).saturating_sub(length));
         let mean = samples.iter().sum::<f64>() / samples.len() as f64;
         let samples: Vec<f64> = samples.iter().map(|y| y - mean).collect();
-        // Tapered, as its ends would count as signal of all frequencies.
-        let turn = TAU / samples.len() as f64;
-        let tapered = samples.iter().enumerate();
-        let tapered = tapered.map(|(i, y)| y * (0.5 - 0.5 * (turn * (i as f64 + 0.5)).cos()));
-        let filter = prediction_error(&tapered.collect::<Vec<_>>(), order);
+        let filter = prediction_of(samples.iter().copied(), order);
+        Self::filtered(samples, filter, None)
+    }
+
+    /// The same with the prediction of the record without a train: spikes are in part predictable from each other, which
+    /// hides that part. `None` for a record with a signal.
+    fn beside_train(&self, train: &FoundTrain) -> Option<Self> {
+        let own = train.shape.train(train.moments, 0..self.samples.len());
+        let rest: Vec<f64> = self.samples.iter().zip(own).map(|(y, s)| y - s).collect();
+        let filter = prediction_of(rest.iter().copied(), self.order());
+        let power = rest.iter().map(|y| y * y).sum::<f64>() / rest.len() as f64;
+        let std = Self::filtered(rest, filter.clone(), None).std;
+        let is_noise = power < SIGNAL * std * std;
+        is_noise.then(|| Self::filtered(self.samples.clone(), filter, Some(std)))
+    }
+
+    /// With the standard deviation of the unpredictable part, if it is not that of the whole prediction error.
+    fn filtered(samples: Vec<f64>, filter: Vec<f64>, std: Option<f64>) -> Self {
+        let order = filter.len() - 1;
         let mut error = vec![0.0; samples.len()];
         for (i, e) in error.iter_mut().enumerate().skip(order) {
             let past = samples[i - order..=i].iter().rev();
             *e = filter.iter().zip(past).map(|(a, y)| a * y).sum();
         }
         let power = error.iter().map(|e| e * e).sum::<f64>();
-        let std = (power / samples.len() as f64).sqrt().max(f64::MIN_POSITIVE);
+        let of_error = (power / samples.len() as f64).sqrt();
+        let std = std.unwrap_or(of_error).max(f64::MIN_POSITIVE);
         error.iter_mut().for_each(|e| *e /= std);
         let next = |i: usize| filter.iter().zip(&error[i..]).map(|(a, e)| a * e).sum();
         let matched = (0..error.len()).map(next).collect();
         Self {
+            samples,
             filter,
             error,
             matched,
@@ -151,6 +177,7 @@ impl SpikeSearch {
         let moments = SpikeMoments {
             moment: 0.0,
             period,
+            is_smooth: false,
         };
         let length = (moments.length() + self.order()).min(period as usize);
         let power = |start: usize| {
@@ -166,21 +193,24 @@ impl SpikeSearch {
         let length = moments.length();
         let mut sums = Sums {
             count: 0.0,
-            part: 0.0,
-            part_square: 0.0,
-            at: vec![0.0; length],
-            with_part: vec![0.0; length.min(STEEP)],
+            products: [[0.0; TERMS]; TERMS],
+            at: vec![[0.0; TERMS]; length],
         };
         for at in moments.within(&self.usable(samples)) {
-            let first = at.ceil();
-            let part = first - at;
+            let first = (at - SAME).ceil();
+            let powers = powers((first - at).max(0.0));
             sums.count += 1.0;
-            sums.part += part;
-            sums.part_square += part * part;
+            for (row, p) in sums.products.iter_mut().zip(powers) {
+                row.iter_mut()
+                    .zip(powers)
+                    .for_each(|(sum, q)| *sum += p * q);
+            }
             let own = &self.matched[first as usize..][..length];
-            sums.at.iter_mut().zip(own).for_each(|(s, w)| *s += w);
-            let both = sums.with_part.iter_mut().zip(own);
-            both.for_each(|(s, w)| *s += part * w);
+            for (sum, w) in sums.at.iter_mut().zip(own) {
+                sum.iter_mut()
+                    .zip(powers)
+                    .for_each(|(sum, p)| *sum += p * w);
+            }
         }
         sums
     }
@@ -188,7 +218,7 @@ impl SpikeSearch {
     /// The shape that explains the most of the prediction error, by least squares, and the power explained.
     fn shape(&self, moments: SpikeMoments) -> Option<(SpikeShape, f64)> {
         let sums = self.sums(moments, 0..self.error.len());
-        let (length, steep) = (sums.at.len(), sums.with_part.len());
+        let all: Vec<(usize, usize)> = moments.coefficients().collect();
         let lag = |lag: usize| -> f64 {
             let both = self
                 .filter
@@ -196,22 +226,17 @@ impl SpikeSearch {
                 .zip(self.filter.get(lag..).unwrap_or(&[]));
             both.map(|(a, b)| a * b).sum()
         };
-        let lags: Vec<f64> = (0..length).map(lag).collect();
-        let matrix = DMatrix::from_fn(length + steep, length + steep, |i, j| {
-            let own = |k: usize| if k < length { (k, 0) } else { (k - length, 1) };
-            let ((i, of_i), (j, of_j)) = (own(i), own(j));
-            let times = [sums.count, sums.part, sums.part_square][of_i + of_j];
-            // Moments at whole samples leave the slope open.
-            let least = if (i, of_i) == (j, of_j) { OPEN } else { 0.0 };
-            (times + least * sums.count) * lags[i.abs_diff(j)]
+        let lags: Vec<f64> = (0..sums.at.len()).map(lag).collect();
+        let matrix = DMatrix::from_fn(all.len(), all.len(), |i, j| {
+            let times = sums.products[all[i].1][all[j].1];
+            // Moments at whole samples leave all but the level open.
+            let least = if i == j { OPEN } else { 0.0 };
+            (times + least * sums.count) * lags[all[i].0.abs_diff(all[j].0)]
         });
-        let right = DVector::from_iterator(
-            length + steep,
-            sums.at.iter().chain(&sums.with_part).copied(),
-        );
+        let right = DVector::from_fn(all.len(), |i, _| sums.at[all[i].0][all[i].1]);
         let found = Cholesky::new(matrix)?.solve(&right);
         let power = found.dot(&right);
-        Some((SpikeShape::of(found.as_slice()), power))
+        Some((SpikeShape::of(moments, found.as_slice()), power))
     }
 
     fn power(&self, moments: SpikeMoments) -> f64 {
@@ -226,6 +251,7 @@ impl SpikeSearch {
         let candidates = steps.map(|k| SpikeMoments {
             moment: start + 0.5 * (k as f64 - 1.0),
             period,
+            is_smooth: false,
         });
         let with_power = candidates.map(|moments| (moments, self.power(moments)));
         let best = with_power.max_by(|a, b| a.1.total_cmp(&b.1));
@@ -233,6 +259,7 @@ impl SpikeSearch {
             SpikeMoments {
                 moment: start,
                 period,
+                is_smooth: false,
             },
             |(m, _)| m,
         )
@@ -243,7 +270,8 @@ impl SpikeSearch {
     pub fn found(&self, period: f64) -> Option<FoundTrain> {
         let mut moments = vec![self.coarse(period)];
         settle(std::slice::from_ref(self), &mut moments, false);
-        self.train(moments[0])
+        let found = again(std::slice::from_ref(self), &mut moments, false)?;
+        found.into_iter().next()
     }
 
     /// Largest power at periods beside that of a train.
@@ -264,25 +292,26 @@ impl SpikeSearch {
         let mut parts: Vec<f64> = moments
             .within(&self.usable(all))
             .map(|at| {
-                let first = at.ceil();
+                let first = (at - SAME).ceil();
                 let own = self.matched[first as usize..].iter().take(moments.length());
-                let part = first - at;
-                own.enumerate().map(|(k, w)| w * shape.value(k, part)).sum()
+                let powers = powers((first - at).max(0.0));
+                own.enumerate()
+                    .map(|(k, w)| w * shape.value(k, powers))
+                    .sum()
             })
             .collect();
         parts.sort_by(f64::total_cmp);
         let mean = parts.iter().sum::<f64>() / parts.len() as f64;
         let typical = parts.get(parts.len() / 2).copied().unwrap_or(0.0);
-        let std = self.std;
-        let times = |values: Vec<f64>| values.into_iter().map(|v| v * std).collect();
+        let in_units = |own: [f64; TERMS]| own.map(|c| c * self.std);
+        let chance = CHANCE + moments.column_count() as f64;
         Some(FoundTrain {
             moments,
             shape: SpikeShape {
-                level: times(shape.level),
-                slope: times(shape.slope),
+                samples: shape.samples.into_iter().map(in_units).collect(),
             },
             power,
-            chance: self.beside(moments).max(CHANCE),
+            chance: self.beside(moments).max(chance),
             is_steady: mean > 0.0 && typical >= TYPICAL * mean,
         })
     }
@@ -311,8 +340,38 @@ pub fn find_trains(records: &[SpikeSearch], period: f64, known: usize) -> Option
     }
     let mut moments: Vec<SpikeMoments> = records.iter().map(|r| r.coarse(period)).collect();
     settle(records, &mut moments, true);
-    let trains = records.iter().zip(moments).map(|(r, m)| r.train(m));
-    trains.collect()
+    again(records, &mut moments, true)
+}
+
+/// The trains from moments found. If the records are hardly predictable without them, they are refined once more with that
+/// prediction, and with the shape that the records justify; a signal leaves the finer details of a shape open.
+fn again(
+    records: &[SpikeSearch],
+    moments: &mut [SpikeMoments],
+    moves_period: bool,
+) -> Option<Vec<FoundTrain>> {
+    let trains = records.iter().zip(&*moments).map(|(r, m)| r.train(*m));
+    let first: Vec<FoundTrain> = trains.collect::<Option<_>>()?;
+    let beside = records.iter().zip(&first);
+    let beside: Option<Vec<SpikeSearch>> = beside.map(|(r, train)| r.beside_train(train)).collect();
+    let Some(records) = beside else {
+        return Some(first);
+    };
+    let mut settled = |is_smooth: bool| {
+        moments.iter_mut().for_each(|m| m.is_smooth = is_smooth);
+        settle(&records, moments, moves_period);
+        let trains = records.iter().zip(&*moments).map(|(r, m)| r.train(*m));
+        trains.collect::<Option<Vec<FoundTrain>>>()
+    };
+    let (steep, smooth) = (settled(false)?, settled(true)?);
+    let worth = |trains: &[FoundTrain]| -> f64 {
+        let of = |train: &FoundTrain| train.power - COST * train.moments.column_count() as f64;
+        trains.iter().map(of).sum()
+    };
+    Some(match worth(&smooth) > worth(&steep) {
+        true => smooth,
+        false => steep,
+    })
 }
 
 /// Moves moments in each record, and the common period, to the largest power explained. The samples in which a spike
@@ -328,6 +387,34 @@ fn settle(records: &[SpikeSearch], moments: &mut [SpikeMoments], moves_period: b
         *m = best.unwrap_or(*m);
     }
     refine(records, moments, moves_period);
+    if moves_period {
+        make_whole(records, moments);
+    }
+}
+
+/// Makes a period a whole number of samples if the spikes are as well explained by that: at whole samples, a drift of up
+/// to a sample over the record changes nothing.
+fn make_whole(records: &[SpikeSearch], moments: &mut [SpikeMoments]) {
+    let longest = records.iter().map(|r| r.error.len()).max().unwrap_or(0) as f64;
+    let Some(period) = moments.first().map(|m| m.period) else {
+        return;
+    };
+    let factor = period.round() / period;
+    if (factor - 1.0).abs() * longest > MOST_DRIFT {
+        return;
+    }
+    let power = |moments: &[SpikeMoments]| -> f64 {
+        let both = records.iter().zip(moments);
+        both.map(|(record, m)| record.power(*m)).sum()
+    };
+    let mut whole = about_middles(records, moments, factor);
+    refine(records, &mut whole, false);
+    // Only the levels of the shape count there.
+    let spared = moments.iter().map(|m| m.column_count() - m.length());
+    let spared = COST * spared.sum::<usize>() as f64;
+    if power(&whole) > (1.0 - SLIGHT) * power(moments) - spared {
+        moments.copy_from_slice(&whole);
+    }
 }
 
 /// The same by steps that are halved.
@@ -378,6 +465,7 @@ fn about_middles(
         SpikeMoments {
             moment: m.moment + spikes * (m.period - period),
             period,
+            ..*m
         }
     };
     records.iter().zip(moments).map(turned).collect()
@@ -415,6 +503,14 @@ pub fn subtract_spikes(samples: &mut [f64], rate_hz: f64, trains: &[SpikeTrain])
         });
     }
     all
+}
+
+/// Coefficients of the prediction error of a record, tapered, as its ends would count as signal of all frequencies.
+fn prediction_of(samples: impl ExactSizeIterator<Item = f64>, order: usize) -> Vec<f64> {
+    let turn = TAU / samples.len() as f64;
+    let tapered = samples.enumerate();
+    let tapered = tapered.map(|(i, y)| y * (0.5 - 0.5 * (turn * (i as f64 + 0.5)).cos()));
+    prediction_error(&tapered.collect::<Vec<_>>(), order)
 }
 
 /// Coefficients of the prediction error of a signal, by Levinson's recursion.
@@ -548,6 +644,26 @@ mod tests {
             let search = SpikeSearch::of(&samples, period);
             let found = find_trains(&[search], period, 4096).unwrap().pop().unwrap();
             assert_eq!(found.share(), 0.0, "{period}: {found:?}");
+        }
+    }
+
+    /// Pulses that change over all of their length, at whole and other periods.
+    #[test]
+    fn smooth_spikes_are_found() {
+        for period in [160.0, 154.78, 205.55] {
+            let mut random = noise(3);
+            let pulse = |q: f64| (-((q - 6.0) / 1.8).powi(2)).exp() * (0.5 * (q - 6.0)).cos();
+            let own = (0..8000).map(|i| 110.0 * pulse((f64::from(i) - 37.3).rem_euclid(period)));
+            let own: Vec<f64> = own.collect();
+            let samples: Vec<f64> = own.iter().map(|s| s + random()).collect();
+            let search = SpikeSearch::of(&samples, 1.0001 * period);
+            let found = find_trains(&[search], 1.0001 * period, 4096).unwrap();
+            let found = &found[0];
+            let drift = 8000.0 * (found.moments.period / period - 1.0).abs();
+            assert!(drift < 0.02, "{period}: {drift}");
+            let left = found.shape.train(found.moments, 0..8000);
+            let left = rms(left.zip(&own).map(|(a, b)| a - b)) / rms(own.iter().copied());
+            assert!(left < 0.012, "{period}: {left}");
         }
     }
 }

@@ -3,9 +3,13 @@
 
 use std::ops::Range;
 
-/// Samples in which a spike dies out, and first of them in which it changes fast.
+/// Samples in which a spike dies out, and first of them in which one with a steep front changes fast.
 pub(super) const LONGEST: usize = 16;
-pub(super) const STEEP: usize = 4;
+const STEEP: usize = 4;
+/// Distance in samples at which a moment coincides with a sample, whatever the rounding.
+pub(super) const SAME: f64 = 1e-6;
+/// Largest number of coefficients of a spike between two samples: of a parabola over the fraction of a sample.
+pub(super) const TERMS: usize = 3;
 
 /// Spikes at equal intervals, independent of the input; their moments and their shape differ from record to record.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +27,9 @@ pub struct SpikeMoments {
     pub moment: f64,
     /// Samples from one to the next.
     pub period: f64,
+    /// Whether the spikes are parabolas between all samples: one with a steep front needs only straight lines, between the
+    /// first samples, and less noise enters its shape.
+    pub is_smooth: bool,
 }
 
 impl SpikeMoments {
@@ -31,27 +38,40 @@ impl SpikeMoments {
         LONGEST.min((0.5 * self.period) as usize)
     }
 
-    /// The sample's index in the spike that precedes it, and its time after the moment less that index, both in
-    /// samples; `None` between spikes.
-    fn place(&self, sample: usize) -> Option<(usize, f64)> {
-        let after = (sample as f64 - self.moment) / self.period;
-        let after = self.period * (after - after.floor());
-        let index = after as usize;
-        (index < self.length()).then_some((index, after - index as f64))
+    /// The sample's index in the spike that precedes it, and the powers of its time after the moment; `None` between
+    /// spikes.
+    fn place(&self, sample: usize) -> Option<(usize, [f64; TERMS])> {
+        let spikes = (sample as f64 - self.moment + SAME) / self.period;
+        let after = (sample as f64 - self.moment - self.period * spikes.floor()).max(0.0);
+        let index = (after + SAME) as usize;
+        (index < self.length()).then(|| (index, powers((after - index as f64).max(0.0))))
+    }
+
+    /// Number of coefficients at a sample of a spike.
+    fn terms(&self, index: usize) -> usize {
+        match (self.is_smooth, index < STEEP) {
+            (true, _) => TERMS,
+            (false, true) => 2,
+            (false, false) => 1,
+        }
+    }
+
+    /// Sample and power of each coefficient.
+    pub(super) fn coefficients(&self) -> impl Iterator<Item = (usize, usize)> {
+        (0..self.length()).flat_map(|index| (0..self.terms(index)).map(move |term| (index, term)))
     }
 
     /// Columns whose sum with the coefficients of a [`SpikeShape`] is the train.
     #[must_use]
     pub fn columns(&self, samples: Range<usize>) -> Vec<Vec<f64>> {
-        let (length, steep) = (self.length(), self.length().min(STEEP));
-        let mut columns = vec![vec![0.0; samples.len()]; length + steep];
+        let mut columns = vec![vec![0.0; samples.len()]; self.column_count()];
         for (row, sample) in samples.enumerate() {
-            if let Some((index, part)) = self.place(sample) {
-                columns[index][row] = 1.0;
-                if index < steep {
-                    columns[length + index][row] = part;
-                }
-            }
+            let Some((index, powers)) = self.place(sample) else {
+                continue;
+            };
+            let before: usize = (0..index).map(|k| self.terms(k)).sum();
+            let own = &mut columns[before..][..self.terms(index)];
+            own.iter_mut().zip(powers).for_each(|(c, p)| c[row] = p);
         }
         columns
     }
@@ -59,7 +79,7 @@ impl SpikeMoments {
     /// Number of those columns.
     #[must_use]
     pub fn column_count(&self) -> usize {
-        self.length() + self.length().min(STEEP)
+        self.coefficients().count()
     }
 
     /// The first moment after the first of some samples, and the following ones with a whole spike before the end.
@@ -72,36 +92,45 @@ impl SpikeMoments {
     }
 }
 
-/// Shape of a spike: its value at each of the samples that follow its moment, linear in the fraction of a sample
-/// between.
+/// Powers of the fraction of a sample between the moment and the next sample, about its middle.
+pub(super) fn powers(part: f64) -> [f64; TERMS] {
+    let middle = part - 0.5;
+    [1.0, middle, middle * middle]
+}
+
+/// Shape of a spike: its value at each of the samples that follow its moment, as a parabola over the fraction of a
+/// sample between.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SpikeShape {
-    pub(super) level: Vec<f64>,
-    pub(super) slope: Vec<f64>,
+    /// Coefficients for each sample.
+    pub(super) samples: Vec<[f64; TERMS]>,
 }
 
 impl SpikeShape {
     /// The shape of the coefficients of [`SpikeMoments::columns`].
     #[must_use]
-    pub fn of(coefficients: &[f64]) -> Self {
-        let length = (0..coefficients.len()).find(|l| l + STEEP.min(*l) == coefficients.len());
-        let (level, slope) = coefficients.split_at(length.unwrap_or(coefficients.len()));
-        Self {
-            level: level.to_vec(),
-            slope: slope.to_vec(),
+    pub fn of(moments: SpikeMoments, coefficients: &[f64]) -> Self {
+        let mut samples = vec![[0.0; TERMS]; moments.length()];
+        for ((index, term), value) in moments.coefficients().zip(coefficients) {
+            samples[index][term] = *value;
         }
+        Self { samples }
     }
 
-    pub(super) fn value(&self, index: usize, part: f64) -> f64 {
-        let slope = self.slope.get(index).copied().unwrap_or(0.0);
-        self.level.get(index).copied().unwrap_or(0.0) + part * slope
+    pub(super) fn value(&self, index: usize, powers: [f64; TERMS]) -> f64 {
+        let own = self.samples.get(index).into_iter().flatten();
+        own.zip(powers).map(|(c, p)| c * p).sum()
     }
 
     /// The train over some samples.
-    pub fn train(&self, moments: SpikeMoments, samples: Range<usize>) -> impl Iterator<Item = f64> {
+    pub fn train(
+        &self,
+        moments: SpikeMoments,
+        samples: Range<usize>,
+    ) -> impl ExactSizeIterator<Item = f64> {
         samples.map(move |sample| {
             let place = moments.place(sample);
-            place.map_or(0.0, |(index, part)| self.value(index, part))
+            place.map_or(0.0, |(index, powers)| self.value(index, powers))
         })
     }
 
