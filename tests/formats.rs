@@ -254,6 +254,33 @@ fn e(value: f64, digits: usize) -> String {
     )
 }
 
+/// Functions with one name are told apart by the labels of their ordinates.
+#[test]
+fn functions_of_one_name_have_their_labels() {
+    let folder = Folder::new();
+    let samples: Vec<f64> = (0..30).map(f64::from).collect();
+    let labelled = |label: &str| {
+        let set = String::from_utf8(data_set(4, true, None, &samples)).unwrap();
+        let lines = set.lines().enumerate().map(|(k, line)| match k {
+            // The ordinate's line, behind those of the data set, its name and its numbers.
+            10 => format!("{}{label:<20}{}\n", &line[..26], &line[46..]),
+            _ => format!("{line}\n"),
+        });
+        lines.collect::<String>()
+    };
+    folder.write("a.uff", labelled("force") + &labelled("torque"));
+    let ran = folder.run(&["extract", "a.uff", "--channel", "torque"]);
+    assert_eq!(
+        table(&ran.stdout).0[1],
+        "bridge torque [mV]",
+        "{}",
+        ran.stderr
+    );
+    folder.write("a.uff", labelled("torque"));
+    let ran = folder.run(&["extract", "a.uff"]);
+    assert_eq!(table(&ran.stdout).0[1], "bridge [mV]", "{}", ran.stderr);
+}
+
 #[test]
 fn functions_of_universal_files_are_channels() {
     let folder = Folder::new();

@@ -581,3 +581,28 @@ fn a_start_that_changes_and_another_dimension_are_told() {
         assert_eq!(report["channels"][0]["rate_hz"].as_f64(), rate, "{report}");
     }
 }
+
+/// A channel of times contradicts the step that LabVIEW states for channels without one.
+#[test]
+fn times_beside_another_increment_are_used_and_said() {
+    let folder = Folder::new();
+    let mut metadata = Out::new(false);
+    metadata.u32(2);
+    let time = metadata.object("/'g'/'Time'", Ok((10, 50))).u32(1);
+    time.word("unit_string", "s");
+    let record = metadata.object("/'g'/'a'", Ok((10, 50))).u32(1);
+    record.number("wf_increment", 1.0);
+    let times = (0..50).map(|i| f64::from(i) * 1e-4);
+    let data = times
+        .chain((0..50).map(f64::from))
+        .flat_map(f64::to_le_bytes);
+    let data: Vec<u8> = data.collect();
+    folder.write("a.tdms", segment(14, 4713, &metadata, &data, false));
+    for verb in ["inspect", "extract"] {
+        let ran = folder.run(&[verb, "a.tdms"]);
+        let said = format!("{}{}", ran.stdout, ran.stderr);
+        assert!(said.contains("rate-contradicts-stamps"), "{verb}: {said}");
+    }
+    let report = folder.json(&["inspect", "a.tdms", "--json"]);
+    assert_eq!(report["channels"][0]["rate_hz"].as_f64(), Some(10_000.0));
+}

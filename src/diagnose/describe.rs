@@ -230,7 +230,15 @@ pub fn shows_torque(over_displacement: bool) -> &'static str {
 }
 
 /// Limitations of the diagnosis.
-pub fn warnings(before: &ScoredModel, verdict: Verdict) -> Vec<Warning> {
+pub fn warnings(found: &SearchState, verdict: Verdict) -> Vec<Warning> {
+    let before = &found.before;
+    if found.refit_diverges {
+        return vec![Warning::new(
+            "declared-not-refitted",
+            "with only the declared effects, the refitted stand diverges on the hold-out records; \"before\" is the stand \
+             file as it is",
+        )];
+    }
     let is_open = matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained);
     let apart = is_open.then(|| records_apart(before)).flatten();
     apart

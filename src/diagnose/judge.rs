@@ -26,12 +26,10 @@ impl SearchState {
         self.records.set_substeps(substeps);
         set_starts(&self.before.fitted, &mut self.records.train);
         set_starts(&self.before.fitted, &mut self.records.holdout);
-        self.before = self.held_out(&self.before).ok_or_else(|| {
-            Failure::failed(
-                ErrorCode::NotIdentifiable,
-                "the plain stand cannot be simulated on the hold-out records",
-            )
-        })?;
+        self.before = match self.held_out(&self.before) {
+            Some(before) => before,
+            None => self.declared_instead()?,
+        };
         self.judge_surface();
         let declared = self.declared.as_ref().and_then(|m| self.held_out(m));
         self.declared = declared.map(ScoredModel::without_samples);
@@ -77,6 +75,21 @@ impl SearchState {
         let without = std::mem::take(&mut self.without);
         self.ladder = Ladder::of(&self.after, &self.before, without, &self.records, threads);
         Ok(())
+    }
+
+    /// The stand as declared, where the refitted one cannot be simulated on the hold-out records: something is missing that
+    /// the fit of the declared effects made up for.
+    fn declared_instead(&mut self) -> Result<ScoredModel, Failure> {
+        let with_effects = |model: &&ScoredModel| model.fitted.structure.declared > 0;
+        let declared = self.declared.as_ref().filter(with_effects);
+        self.refit_diverges = true;
+        declared.and_then(|model| self.held_out(model)).ok_or_else(|| {
+            Failure::failed(
+                ErrorCode::NotIdentifiable,
+                "the plain stand cannot be simulated on the hold-out records; if the stand file has [[effects]], diagnose \
+                 without one or all of them",
+            )
+        })
     }
 
     fn held_out(&self, model: &ScoredModel) -> Option<ScoredModel> {

@@ -157,6 +157,8 @@ struct SearchState {
     settled: bool,
     /// Whether the held-out records confirm none of the effects found in the training records.
     is_refuted: bool,
+    /// Whether the declared stand stands for the refitted one, which diverges on the hold-out records.
+    refit_diverges: bool,
     /// The records with the weights with which models were compared, if there were any.
     weighted: Option<Records>,
     /// Whether a shift of the channels explains the records better than the effects.
@@ -291,6 +293,7 @@ impl SearchState {
             tests,
             settled: true,
             is_refuted: false,
+            refit_diverges: false,
             weighted: None,
             is_outdone: false,
         };

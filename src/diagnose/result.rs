@@ -198,7 +198,7 @@ impl Diagnosis {
                 (changed_stand.as_ref(), force_surface.as_ref()),
                 verdict,
             ),
-            warnings: [case.warnings, describe::warnings(&found.before, verdict)].concat(),
+            warnings: [case.warnings, describe::warnings(&found, verdict)].concat(),
             candidates: found.candidates(),
             detection_limits,
             suspected,

@@ -27,6 +27,8 @@ const FINEST: f64 = 1.0 / 256.0;
 const MOST_DRIFT: f64 = 1.5;
 /// Part of the power explained that does not matter: 1 % of the spikes.
 const SLIGHT: f64 = 1e-4;
+/// Power relative to the largest from which the latest moment is taken.
+const AS_GOOD: f64 = 0.98;
 /// Steps of a moment tried on either side.
 const ASIDE: i32 = 2;
 /// Smallest relative change of a sum of squares that counts.
@@ -383,8 +385,13 @@ fn settle(records: &[SpikeSearch], moments: &mut [SpikeMoments], moves_period: b
             moment: m.moment + f64::from(k),
             ..*m
         });
-        let best = whole.max_by(|a, b| record.power(*a).total_cmp(&record.power(*b)));
-        *m = best.unwrap_or(*m);
+        let with_power = whole.map(|moments| (moments, record.power(moments)));
+        let with_power: Vec<(SpikeMoments, f64)> = with_power.collect();
+        let most = with_power.iter().fold(0.0, |most, (_, p)| p.max(most));
+        // The end of a spike that dies out is predictable, so that to cut it hardly costs power. A sample is left before the
+        // front, for moments that are not exact yet.
+        let latest = with_power.iter().rposition(|(_, p)| *p >= AS_GOOD * most);
+        *m = with_power[latest.map_or(0, |place| place.saturating_sub(1))].0;
     }
     refine(records, moments, moves_period);
     if moves_period {

@@ -3,9 +3,8 @@
 
 use std::ops::Range;
 
-/// Samples in which a spike dies out, and first of them in which one with a steep front changes fast.
+/// Samples in which a spike dies out.
 pub(super) const LONGEST: usize = 16;
-const STEEP: usize = 4;
 /// Distance in samples at which a moment coincides with a sample, whatever the rounding.
 pub(super) const SAME: f64 = 1e-6;
 /// Largest number of coefficients of a spike between two samples: of a parabola over the fraction of a sample.
@@ -27,8 +26,8 @@ pub struct SpikeMoments {
     pub moment: f64,
     /// Samples from one to the next.
     pub period: f64,
-    /// Whether the spikes are parabolas between all samples: one with a steep front needs only straight lines, between the
-    /// first samples, and less noise enters its shape.
+    /// Whether the spikes are parabolas between samples. One with a steep front needs only straight lines, and less noise
+    /// enters its shape.
     pub is_smooth: bool,
 }
 
@@ -47,18 +46,15 @@ impl SpikeMoments {
         (index < self.length()).then(|| (index, powers((after - index as f64).max(0.0))))
     }
 
-    /// Number of coefficients at a sample of a spike.
-    fn terms(&self, index: usize) -> usize {
-        match (self.is_smooth, index < STEEP) {
-            (true, _) => TERMS,
-            (false, true) => 2,
-            (false, false) => 1,
-        }
+    /// Number of coefficients at each sample of a spike.
+    fn terms(&self) -> usize {
+        if self.is_smooth { TERMS } else { TERMS - 1 }
     }
 
     /// Sample and power of each coefficient.
-    pub(super) fn coefficients(&self) -> impl Iterator<Item = (usize, usize)> {
-        (0..self.length()).flat_map(|index| (0..self.terms(index)).map(move |term| (index, term)))
+    pub(super) fn coefficients(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let terms = self.terms();
+        (0..self.length()).flat_map(move |index| (0..terms).map(move |term| (index, term)))
     }
 
     /// Columns whose sum with the coefficients of a [`SpikeShape`] is the train.
@@ -69,9 +65,9 @@ impl SpikeMoments {
             let Some((index, powers)) = self.place(sample) else {
                 continue;
             };
-            let before: usize = (0..index).map(|k| self.terms(k)).sum();
-            let own = &mut columns[before..][..self.terms(index)];
-            own.iter_mut().zip(powers).for_each(|(c, p)| c[row] = p);
+            let own = columns[self.terms() * index..].iter_mut();
+            let own = own.take(self.terms());
+            own.zip(powers).for_each(|(c, p)| c[row] = p);
         }
         columns
     }
@@ -79,7 +75,7 @@ impl SpikeMoments {
     /// Number of those columns.
     #[must_use]
     pub fn column_count(&self) -> usize {
-        self.coefficients().count()
+        self.terms() * self.length()
     }
 
     /// The first moment after the first of some samples, and the following ones with a whole spike before the end.

@@ -4,11 +4,13 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use torqcomp_decimal::digits;
+use torqcomp_dsp::quality::rate::contradiction;
 
 use super::objects::{Properties, Property, TdmsObject, TdmsObjects};
 use super::scales;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
+use crate::recording::choice::contradicted as contradicted_rates;
 use crate::recording::formats::{Content, NAMED, channel, names_left_out, plausible_rate, stamped};
 use crate::recording::moment::{Moment, date_and_time};
 use crate::recording::text::{ClockOrigin, is_time_name};
@@ -46,7 +48,6 @@ impl ScaledChannel {
     fn is_time(&self) -> bool {
         self.is_times()
             || is_time_name(&self.object.path[1])
-                && self.object.number("wf_increment").is_none()
                 && self.values.windows(2).all(|pair| pair[1] >= pair[0])
     }
 }
@@ -69,18 +70,37 @@ pub(super) fn channels(
     let mut made = Vec::new();
     for one in &found {
         let is_column = reading.time_column.is_some();
-        let of_header = || of_waveform(&one.object, first_ns);
-        let stamps = times
-            .place(&found, one)
-            .filter(|_| is_column || of_header().is_none());
-        made.push(match stamps {
-            Some(place) => {
-                if let std::collections::hash_map::Entry::Vacant(entry) = axes.entry(place) {
-                    entry.insert(of_times(&found[place], reading)?);
-                }
-                axes.get(&place).cloned()
-            }
-            None => of_header(),
+        let of_header = of_waveform(&one.object, first_ns);
+        let Some(place) = times.place(&found, one) else {
+            made.push(of_header);
+            continue;
+        };
+        let of_stamps = match (axes.get(&place), &of_header) {
+            (Some(axis), _) => axis.clone(),
+            (None, None) => of_times(&found[place], reading)?,
+            (None, Some(header)) => match of_times(&found[place], reading) {
+                Ok(axis) => axis,
+                Err(failure) if is_column => return Err(failure),
+                // Then it is just another channel.
+                Err(_) => header.clone(),
+            },
+        };
+        let contradicted = of_header.as_ref().and_then(|header| {
+            let (stated_hz, stamped_hz) = (header.rate_hz?, of_stamps.rate_hz?);
+            contradiction(stated_hz, stamped_hz, one.len())
+        });
+        let uses_header = !is_column && of_header.is_some() && contradicted.is_none();
+        if let (Some(found), false) = (&contradicted, is_column) {
+            let whose = format!("\"{}\"", one.name());
+            content.warnings.push(contradicted_rates(&whose, found));
+        }
+        if !uses_header {
+            axes.insert(place, of_stamps.clone());
+        }
+        made.push(if uses_header {
+            of_header
+        } else {
+            Some(of_stamps)
         });
     }
     for (place, (one, axis)) in found.into_iter().zip(made).enumerate() {

@@ -51,7 +51,7 @@ fn read(bytes: &mut Bytes, _: &Reading) -> Result<Content, Failure> {
         number: 0,
     };
     let mut content = Content::default();
-    let mut left_out = Vec::new();
+    let (mut left_out, mut labels) = (Vec::new(), Vec::new());
     let mut kinds = Vec::new();
     while let Some(line) = lines.next()? {
         if line.trim() != "-1" {
@@ -70,7 +70,8 @@ fn read(bytes: &mut Bytes, _: &Reading) -> Result<Content, Failure> {
             } else {
                 "58b"
             });
-            let is_whole = data_set(&mut lines, storage, &mut content, &mut left_out)?;
+            let others = (&mut left_out, &mut labels);
+            let is_whole = data_set(&mut lines, storage, &mut content, others)?;
             if !is_whole {
                 break;
             }
@@ -84,9 +85,26 @@ fn read(bytes: &mut Bytes, _: &Reading) -> Result<Content, Failure> {
             format!("left out: {}", left_out.join(", ")),
         ));
     }
+    tell_apart(&mut content.channels, &labels);
     kinds.dedup();
     content.dialect = format!("universal file, data sets {}", kinds.join(" and "));
     Ok(content)
+}
+
+/// Adds the labels of their ordinates to names that several functions have, if the labels differ.
+fn tell_apart(channels: &mut [Channel], labels: &[String]) {
+    let names: Vec<String> = channels
+        .iter()
+        .map(|channel| channel.name.clone())
+        .collect();
+    for (k, channel) in channels.iter_mut().enumerate() {
+        let label = &labels[k];
+        let is_another = |other: usize| names[other] == names[k] && labels[other] != *label;
+        if !label.is_empty() && (0..names.len()).any(is_another) {
+            channel.name = format!("{} {label}", names[k]);
+            channel.heading = channel.heading.replacen(&names[k], &channel.name, 1);
+        }
+    }
 }
 
 /// Storage of the numbers of a data set, from its line with 58.
@@ -118,12 +136,13 @@ fn storage(line: &str, lines: &Lines) -> Result<Storage, Failure> {
     Ok(Storage::Binary(order, count))
 }
 
-/// Reads a data set 58; returns whether it was complete.
+/// Reads a data set 58, with the names of those that are no channels, and the labels of those that are; returns whether
+/// it was complete.
 fn data_set(
     lines: &mut Lines,
     storage: Storage,
     content: &mut Content,
-    left_out: &mut Vec<String>,
+    (left_out, labels): (&mut Vec<String>, &mut Vec<String>),
 ) -> Result<bool, Failure> {
     let Some(head) = Head::read(lines)? else {
         content.lost = Some(cut("within the header of a data set"));
@@ -158,6 +177,7 @@ fn data_set(
         None => {
             let channel = made(&head, &name, &values[..there - there % each], lines)?;
             content.channels.push(channel);
+            labels.push(head.axes[1].label.clone());
         }
     }
     if !is_whole {
