@@ -8,7 +8,8 @@ use torqcomp_model::Unit;
 
 use super::axis::{REVERSED, falls, step_of};
 use super::moment::Moment;
-use super::stamps::{TOLERABLE, refuse_shared_stamps};
+use super::shared_stamps::refuse_shared_stamps;
+use super::stamps::TOLERABLE;
 use super::text::CELLS_WITH_UNITS;
 use super::{Channel, Hole, HoleKind, RateFrom, Recording, check_holes, check_size, formats};
 use crate::failure::{ErrorCode, Failure, did_you_mean};

@@ -20,6 +20,7 @@ mod lines;
 mod parameter;
 mod rivals;
 mod spike_search;
+mod spike_trains;
 mod spikes;
 
 mod backlash;
@@ -55,7 +56,8 @@ pub use capacitive_coupling::level;
 pub use lines::{FoundLine, SpectralLine, subtract_lines};
 pub use parameter::{EffectParameter, History, ParameterScale, RecordScales, Unit};
 pub use rivals::RIVALS;
-pub use spike_search::{FoundTrain, SpikeSearch, find_trains, subtract_spikes};
+pub use spike_search::{FoundTrain, SpikeSearch, subtract_spikes};
+pub use spike_trains::find_trains;
 pub use spikes::{SpikeMoments, SpikeShape, SpikeTrain};
 pub use thermal_drift::subtract_course;
 

@@ -6,6 +6,7 @@ use std::ops::Range;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::lines::FoundLine;
+use super::spike_trains::{again, find_trains, settle};
 use super::spikes::{LONGEST, SAME, SpikeMoments, SpikeShape, SpikeTrain, TERMS, powers};
 
 /// Shortest period in samples: a spike fills at most half of it.
@@ -18,19 +19,6 @@ const FLOOR: f64 = 1e-11;
 const BINS: usize = 4;
 /// Samples at the beginning of a record from which a declared rate is refined, doubled until all are used.
 const FIRST_SAMPLES: usize = 4096;
-/// Rates tried on either side, a quarter of a sample of drift apart.
-const RATES: i32 = 8;
-const DRIFT: f64 = 0.25;
-/// Final resolution of moments and drift, in samples.
-const FINEST: f64 = 1.0 / 256.0;
-/// Drift from a whole period over a record, in samples, up to which that period is tried.
-const MOST_DRIFT: f64 = 1.5;
-/// Part of the power explained that does not matter: 1 % of the spikes.
-const SLIGHT: f64 = 1e-4;
-/// Power relative to the largest from which the latest moment is taken.
-const AS_GOOD: f64 = 0.98;
-/// Steps of a moment tried on either side.
-const ASIDE: i32 = 2;
 /// Smallest relative change of a sum of squares that counts.
 const OPEN: f64 = 1e-9;
 /// Least part of a typical spike in the mean one: outliers that happen to be a multiple of a period apart leave most
@@ -41,8 +29,6 @@ const TYPICAL: f64 = 0.5;
 const CHANCE: f64 = 30.0;
 /// Power of a record without its train, relative to its unpredictable part, from which it has a signal.
 const SIGNAL: f64 = 4.0;
-/// Power that a further coefficient of a shape must explain.
-const COST: f64 = 4.0;
 /// Periods beside that of a train at which the record shows what its signal reaches, in drifts by a spike's length.
 const BESIDE: std::ops::RangeInclusive<u32> = 2..=5;
 /// Largest plausible size of the spikes of a record, relative to those of the stand.
@@ -111,7 +97,7 @@ impl SpikeSearch {
 
     /// The same with the prediction of the record without a train: spikes are in part predictable from each other, which
     /// hides that part. `None` for a record with a signal.
-    fn beside_train(&self, train: &FoundTrain) -> Option<Self> {
+    pub(super) fn beside_train(&self, train: &FoundTrain) -> Option<Self> {
         let own = train.shape.train(train.moments, 0..self.samples.len());
         let rest: Vec<f64> = self.samples.iter().zip(own).map(|(y, s)| y - s).collect();
         let filter = prediction_of(rest.iter().copied(), self.order());
@@ -144,6 +130,11 @@ impl SpikeSearch {
         }
     }
 
+    /// Number of samples of the record.
+    pub(super) fn len(&self) -> usize {
+        self.error.len()
+    }
+
     fn order(&self) -> usize {
         self.filter.len() - 1
     }
@@ -155,7 +146,7 @@ impl SpikeSearch {
     }
 
     /// The moment at which the folded prediction error has the most power in the length of a spike and of the filter.
-    fn folded(&self, period: f64, samples: Range<usize>) -> (f64, f64) {
+    pub(super) fn folded(&self, period: f64, samples: Range<usize>) -> (f64, f64) {
         let samples = self.usable(samples);
         let count = ((period * BINS as f64) as usize).max(1);
         let mut bins = vec![(0.0, 0.0_f64); count];
@@ -241,12 +232,12 @@ impl SpikeSearch {
         Some((SpikeShape::of(moments, found.as_slice()), power))
     }
 
-    fn power(&self, moments: SpikeMoments) -> f64 {
+    pub(super) fn power(&self, moments: SpikeMoments) -> f64 {
         self.shape(moments).map_or(0.0, |(_, power)| power)
     }
 
     /// The moments of a train of that period, as far as the folded record gives them.
-    fn coarse(&self, period: f64) -> SpikeMoments {
+    pub(super) fn coarse(&self, period: f64) -> SpikeMoments {
         let (start, _) = self.folded(period, 0..self.error.len());
         // The window of the folded record is longer than a spike.
         let steps = 0..=2 * self.order() + 2;
@@ -288,7 +279,7 @@ impl SpikeSearch {
         powers.fold(0.0, f64::max)
     }
 
-    fn train(&self, moments: SpikeMoments) -> Option<FoundTrain> {
+    pub(super) fn train(&self, moments: SpikeMoments) -> Option<FoundTrain> {
         let all = 0..self.error.len();
         let (shape, power) = self.shape(moments)?;
         let mut parts: Vec<f64> = moments
@@ -317,165 +308,6 @@ impl SpikeSearch {
             is_steady: mean > 0.0 && typical >= TYPICAL * mean,
         })
     }
-}
-
-/// The trains of common period in records of the same rate, near a period that is known over the first of their
-/// samples.
-#[must_use]
-pub fn find_trains(records: &[SpikeSearch], period: f64, known: usize) -> Option<Vec<FoundTrain>> {
-    let longest = records.iter().map(|r| r.error.len()).max()?;
-    let mut period = period;
-    let mut count = known.min(longest);
-    loop {
-        let power = |period: f64| -> f64 {
-            let folded = |r: &SpikeSearch| r.folded(period, 0..count.min(r.error.len())).1;
-            records.iter().map(folded).sum()
-        };
-        let tried = (-RATES..=RATES)
-            .map(|k| period * (1.0 + f64::from(k) * DRIFT * 2.0 / count as f64))
-            .map(|period| (period, power(period)));
-        period = tried.max_by(|a, b| a.1.total_cmp(&b.1))?.0;
-        if count == longest {
-            break;
-        }
-        count = (2 * count).min(longest);
-    }
-    let mut moments: Vec<SpikeMoments> = records.iter().map(|r| r.coarse(period)).collect();
-    settle(records, &mut moments, true);
-    again(records, &mut moments, true)
-}
-
-/// The trains from moments found. If the records are hardly predictable without them, they are refined once more with that
-/// prediction, and with the shape that the records justify; a signal leaves the finer details of a shape open.
-fn again(
-    records: &[SpikeSearch],
-    moments: &mut [SpikeMoments],
-    moves_period: bool,
-) -> Option<Vec<FoundTrain>> {
-    let trains = records.iter().zip(&*moments).map(|(r, m)| r.train(*m));
-    let first: Vec<FoundTrain> = trains.collect::<Option<_>>()?;
-    let beside = records.iter().zip(&first);
-    let beside: Option<Vec<SpikeSearch>> = beside.map(|(r, train)| r.beside_train(train)).collect();
-    let Some(records) = beside else {
-        return Some(first);
-    };
-    let mut settled = |is_smooth: bool| {
-        moments.iter_mut().for_each(|m| m.is_smooth = is_smooth);
-        settle(&records, moments, moves_period);
-        let trains = records.iter().zip(&*moments).map(|(r, m)| r.train(*m));
-        trains.collect::<Option<Vec<FoundTrain>>>()
-    };
-    let (steep, smooth) = (settled(false)?, settled(true)?);
-    let worth = |trains: &[FoundTrain]| -> f64 {
-        let of = |train: &FoundTrain| train.power - COST * train.moments.column_count() as f64;
-        trains.iter().map(of).sum()
-    };
-    Some(match worth(&smooth) > worth(&steep) {
-        true => smooth,
-        false => steep,
-    })
-}
-
-/// Moves moments in each record, and the common period, to the largest power explained. The samples in which a spike
-/// changes fast are found once the fractions of samples are known.
-fn settle(records: &[SpikeSearch], moments: &mut [SpikeMoments], moves_period: bool) {
-    refine(records, moments, moves_period);
-    for (record, m) in records.iter().zip(moments.iter_mut()) {
-        let whole = (-(LONGEST as i32)..=LONGEST as i32).map(|k| SpikeMoments {
-            moment: m.moment + f64::from(k),
-            ..*m
-        });
-        let with_power = whole.map(|moments| (moments, record.power(moments)));
-        let with_power: Vec<(SpikeMoments, f64)> = with_power.collect();
-        let most = with_power.iter().fold(0.0, |most, (_, p)| p.max(most));
-        // The end of a spike that dies out is predictable, so that to cut it hardly costs power. A sample is left before the
-        // front, for moments that are not exact yet.
-        let latest = with_power.iter().rposition(|(_, p)| *p >= AS_GOOD * most);
-        *m = with_power[latest.map_or(0, |place| place.saturating_sub(1))].0;
-    }
-    refine(records, moments, moves_period);
-    if moves_period {
-        make_whole(records, moments);
-    }
-}
-
-/// Makes a period a whole number of samples if the spikes are as well explained by that: at whole samples, a drift of up
-/// to a sample over the record changes nothing.
-fn make_whole(records: &[SpikeSearch], moments: &mut [SpikeMoments]) {
-    let longest = records.iter().map(|r| r.error.len()).max().unwrap_or(0) as f64;
-    let Some(period) = moments.first().map(|m| m.period) else {
-        return;
-    };
-    let factor = period.round() / period;
-    if (factor - 1.0).abs() * longest > MOST_DRIFT {
-        return;
-    }
-    let power = |moments: &[SpikeMoments]| -> f64 {
-        let both = records.iter().zip(moments);
-        both.map(|(record, m)| record.power(*m)).sum()
-    };
-    let mut whole = about_middles(records, moments, factor);
-    refine(records, &mut whole, false);
-    // Only the levels of the shape count there.
-    let spared = moments.iter().map(|m| m.column_count() - m.length());
-    let spared = COST * spared.sum::<usize>() as f64;
-    if power(&whole) > (1.0 - SLIGHT) * power(moments) - spared {
-        moments.copy_from_slice(&whole);
-    }
-}
-
-/// The same by steps that are halved.
-fn refine(records: &[SpikeSearch], moments: &mut [SpikeMoments], moves_period: bool) {
-    let longest = records.iter().map(|r| r.error.len()).max().unwrap_or(0) as f64;
-    let at_best = |(record, m): (&SpikeSearch, SpikeMoments), step: f64| {
-        let moved = (-ASIDE..=ASIDE).map(|k| SpikeMoments {
-            moment: m.moment + f64::from(k) * step,
-            ..m
-        });
-        let with_power = moved.map(|m| (m, record.power(m)));
-        let best = with_power.max_by(|a, b| a.1.total_cmp(&b.1));
-        best.unwrap_or((m, 0.0))
-    };
-    let mut best = f64::NEG_INFINITY;
-    let mut step = DRIFT;
-    while step >= FINEST {
-        let before = best;
-        let sides = if moves_period { -1..=1 } else { 0..=0 };
-        let start = moments.to_vec();
-        for side in sides {
-            let factor = 1.0 + 2.0 * step * f64::from(side) / longest;
-            let turned = about_middles(records, &start, factor);
-            let found = records.iter().zip(turned).map(|both| at_best(both, step));
-            let (found, powers): (Vec<SpikeMoments>, Vec<f64>) = found.unzip();
-            let power = powers.iter().sum::<f64>();
-            if power > best {
-                best = power;
-                moments.copy_from_slice(&found);
-            }
-        }
-        if best <= before {
-            step *= 0.5;
-        }
-    }
-}
-
-/// The moments with another period, unchanged in the middle of each record.
-fn about_middles(
-    records: &[SpikeSearch],
-    moments: &[SpikeMoments],
-    factor: f64,
-) -> Vec<SpikeMoments> {
-    let turned = |(record, m): (&SpikeSearch, &SpikeMoments)| {
-        let middle = 0.5 * record.error.len() as f64;
-        let spikes = ((middle - m.moment) / m.period).round();
-        let period = factor * m.period;
-        SpikeMoments {
-            moment: m.moment + spikes * (m.period - period),
-            period,
-            ..*m
-        }
-    };
-    records.iter().zip(moments).map(turned).collect()
 }
 
 /// Subtracts trains from a record, each with the moments and the mean shape of its spikes in the record; of a train

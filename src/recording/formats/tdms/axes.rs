@@ -10,7 +10,7 @@ use super::objects::{Properties, Property, TdmsObject, TdmsObjects};
 use super::scales;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
-use crate::recording::choice::contradicted as contradicted_rates;
+use crate::recording::choice::contradicted;
 use crate::recording::formats::{Content, NAMED, channel, names_left_out, plausible_rate, stamped};
 use crate::recording::moment::{Moment, date_and_time};
 use crate::recording::text::{ClockOrigin, is_time_name};
@@ -69,39 +69,32 @@ pub(super) fn channels(
     let mut axes: HashMap<usize, TimeAxis> = HashMap::new();
     let mut made = Vec::new();
     for one in &found {
-        let is_column = reading.time_column.is_some();
         let of_header = of_waveform(&one.object, first_ns);
         let Some(place) = times.place(&found, one) else {
             made.push(of_header);
             continue;
         };
-        let of_stamps = match (axes.get(&place), &of_header) {
-            (Some(axis), _) => axis.clone(),
-            (None, None) => of_times(&found[place], reading)?,
-            (None, Some(header)) => match of_times(&found[place], reading) {
-                Ok(axis) => axis,
-                Err(failure) if is_column => return Err(failure),
-                // Then it is just another channel.
-                Err(_) => header.clone(),
-            },
+        let known = axes.get(&place).cloned();
+        let of_stamps = known.map_or_else(|| of_times(&found[place], reading), Ok);
+        let (axis, uses_stamps) = match (of_header, of_stamps) {
+            // Otherwise it is just another channel.
+            (Some(header), Err(_)) if reading.time_column.is_none() => (header, false),
+            (_, Err(failure)) => return Err(failure),
+            (Some(header), Ok(stamps)) if reading.time_column.is_none() => {
+                match contradiction_between(&header, &stamps, one) {
+                    Some(warning) => {
+                        content.warnings.push(warning);
+                        (stamps, true)
+                    }
+                    None => (header, false),
+                }
+            }
+            (_, Ok(stamps)) => (stamps, true),
         };
-        let contradicted = of_header.as_ref().and_then(|header| {
-            let (stated_hz, stamped_hz) = (header.rate_hz?, of_stamps.rate_hz?);
-            contradiction(stated_hz, stamped_hz, one.len())
-        });
-        let uses_header = !is_column && of_header.is_some() && contradicted.is_none();
-        if let (Some(found), false) = (&contradicted, is_column) {
-            let whose = format!("\"{}\"", one.name());
-            content.warnings.push(contradicted_rates(&whose, found));
+        if uses_stamps {
+            axes.insert(place, axis.clone());
         }
-        if !uses_header {
-            axes.insert(place, of_stamps.clone());
-        }
-        made.push(if uses_header {
-            of_header
-        } else {
-            Some(of_stamps)
-        });
+        made.push(Some(axis));
     }
     for (place, (one, axis)) in found.into_iter().zip(made).enumerate() {
         if axes.contains_key(&place) {
@@ -122,6 +115,18 @@ pub(super) fn channels(
     }
     content.warnings.extend(names_left_out(left_out));
     Ok(())
+}
+
+/// A warning if the rate in the header of a channel is not that of its times. LabVIEW states a step of 1 s for channels
+/// without one.
+fn contradiction_between(
+    header: &TimeAxis,
+    stamps: &TimeAxis,
+    one: &ScaledChannel,
+) -> Option<Warning> {
+    let (stated_hz, stamped_hz) = (header.rate_hz?, stamps.rate_hz?);
+    let found = contradiction(stated_hz, stamped_hz, one.len())?;
+    Some(contradicted(&format!("\"{}\"", one.name()), &found))
 }
 
 /// Channels with scaled values, and the names of those without.
