@@ -60,6 +60,38 @@ fn a_joint_that_comes_loose() {
     );
 }
 
+/// The same beside a spring that stiffens, which the stand file declares: a change of a stand with that spring.
+#[test]
+fn a_joint_comes_loose_beside_a_declared_effect() {
+    let loose = |t: f64, x: f64| if t > MOMENT_S { -0.02 * x } else { 0.0 };
+    let (train, noise_rms) = record(
+        |t, x, _| loose(t, x) + 0.03 * x.powi(3),
+        (0.12, 50.0),
+        &mut Noise(12),
+    );
+    let folder = Folder::new();
+    folder.write("train.csv", train);
+    folder.write(
+        "stand.toml",
+        "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"20 Hz\"\ndamping_ratio = 0.05\n\
+         [[effects]]\nkind = \"cubic-stiffness\"\nform = \"beside\"\ncoefficient = \"0.029 1/(N m)^2\"\n",
+    );
+    let args = "diagnose --json --stand stand.toml --train train.csv --applied applied_n_m --measured measured_n_m";
+    let report = folder.json(&args.split_whitespace().collect::<Vec<_>>());
+    let change = &report["changed_stand"];
+    assert!(
+        (number(&change["time_s"]) - MOMENT_S).abs() < 10.0 / RATE_HZ,
+        "{change}"
+    );
+    let [before, after] = ["before", "after"].map(|side| number(&change["constants"][0][side]));
+    let fallen = after / before;
+    assert!((fallen - 0.98_f64.sqrt()).abs() < 5e-4, "{change}");
+    assert!(
+        number(&change["two_stands_rms"]) < 1.2 * noise_rms,
+        "{change}"
+    );
+}
+
 /// Linearly growing damping, and a wavy spring: no moment is named.
 #[test]
 fn what_does_not_happen_at_a_moment() {

@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use crate::motion;
 use crate::noise::Noise;
+use crate::one_mode;
 use crate::util::Folder;
 
 const NATURAL_HZ: f64 = 20.0;
@@ -224,4 +225,65 @@ fn noise_on_the_torque_of_hits_is_no_gap() {
     };
     let (right, named) = answers(&setting);
     assert!(right >= 7 && named.is_empty(), "{right} of 8; {named:?}");
+}
+
+/// A recorder that clips the training record, and a line: the held-out record, at a lower level, shows the line only.
+/// Declared together, both leave nothing, though the relative error is larger at the lower level: it is noise.
+#[test]
+fn what_only_the_training_record_shows_is_not_explained() {
+    let folder = Folder::new();
+    let mut noise = Noise(31);
+    let mut limit = 0.0;
+    for (name, level) in [("train.csv", 0.12), ("holdout.csv", 0.05)] {
+        let (text, _) = one_mode::record(|_, _, _| 0.0, (level, 40.0), &mut noise);
+        let mut rows = text.lines().map(str::to_owned);
+        let mut changed = rows.next().unwrap() + "\n";
+        let samples: Vec<Vec<f64>> = rows
+            .map(|row| row.split(',').map(|cell| cell.parse().unwrap()).collect())
+            .collect();
+        if limit == 0.0 {
+            let peak = samples
+                .iter()
+                .fold(0.0_f64, |most, row| most.max(row[2].abs()));
+            limit = 0.93 * peak;
+        }
+        for row in samples {
+            let line = 0.012 * (TAU * 50.0 * row[0] + 0.7).sin();
+            let seen = row[2].clamp(-limit, limit) + line;
+            changed += &format!("{:.6},{:.9},{seen:.9}\n", row[0], row[1]);
+        }
+        folder.write(name, changed);
+    }
+    let plain = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"20 Hz\"\ndamping_ratio = 0.05\n";
+    let run = |stand: &str| {
+        folder.write("stand.toml", format!("{plain}{stand}"));
+        let args = "diagnose --json --stand stand.toml --train train.csv --holdout holdout.csv --applied applied_n_m \
+                    --measured measured_n_m";
+        folder.json(&args.split_whitespace().collect::<Vec<_>>())
+    };
+    let found = run("");
+    let described = &found["residual"]["described"];
+    assert_eq!(found["verdict"], "partly-explained", "{found}");
+    assert!(
+        described
+            .as_str()
+            .unwrap()
+            .contains("in the training records"),
+        "{described}"
+    );
+    let effect = |kind: &str, form: &str, more: &str| {
+        format!("[[effects]]\nkind = \"{kind}\"\nform = \"{form}\"\n{more}\n")
+    };
+    let clipped = effect(
+        "saturation",
+        "hard",
+        &format!("limit = \"{:.6} N m\"", 1.01 * limit),
+    );
+    let line = effect(
+        "mains-pickup",
+        "50-Hz",
+        "frequency = \"50 Hz\"\namplitude = \"0.01 N m\"",
+    );
+    let complete = run(&(clipped + &line));
+    assert_eq!(complete["verdict"], "nothing-missing", "{complete}");
 }
