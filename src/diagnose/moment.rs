@@ -133,11 +133,18 @@ impl SearchState {
         if self.before.fitted.structure.context.held.is_some() {
             return None;
         }
-        // A change beside an effect is one only together with it.
-        let mut bases = vec![Base::of(&self.before.fitted)];
+        // A change beside an effect is one only together with it; such fits take long, and need a reason.
+        let mut models = vec![(&self.before, &self.tests_before)];
         if !self.after.effect_names().is_empty() {
-            bases.push(Base::of(&self.after.fitted));
+            models.push((&self.after, &self.tests));
         }
+        models.retain(|(model, tests)| {
+            model.fitted.structure.effects.is_empty() || tests.nonstationary().is_some()
+        });
+        let bases: Vec<Base> = models
+            .iter()
+            .map(|(model, _)| Base::of(&model.fitted))
+            .collect();
         let noise_rms = noise_rms(self.noise_floor);
         let mut records: Vec<&StandRecord> = Vec::new();
         for record in self.records.train.iter().chain(&self.records.holdout) {
