@@ -7,7 +7,6 @@ use crate::failure::{ErrorCode, Failure};
 
 /// Maximum number of copies of a row: more rows with one stamp indicate a coarse clock.
 const MOST_COPIES: f64 = 4.0;
-
 /// Number of samples with one stamp above which resampling would lose most of them.
 const SHARED: f64 = 1.5;
 /// Largest fraction of rows missing or written twice that explains rounded stamps as well as another rate.

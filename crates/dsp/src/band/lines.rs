@@ -107,11 +107,10 @@ impl BandSearch {
             let excess = self.density[line] - self.noise[line];
             above[line] = above[line + 1] + self.power_gain[line] * excess;
         }
-        let least = LARGE_GAIN * LARGE_GAIN * self.gain_at_rest();
         let is_gap = |line: &usize| {
             let below = (APART * *line as f64) as usize;
-            let is_amplified = self.power_gain[*line] > least && above[*line] > 0.0;
-            is_amplified && above[below] - above[*line] < QUIET * above[*line]
+            let is_signal = self.is_amplified(*line) && above[*line] > 0.0;
+            is_signal && above[below] - above[*line] < QUIET * above[*line]
         };
         let from = (0..end).find(is_gap)?;
         let mut rest = self.clone();
@@ -131,11 +130,15 @@ impl BandSearch {
     /// The line at the upper end of a band with the largest contribution to the result, if it is
     /// amplified.
     fn strongest_near(&self, top_hz: f64) -> Option<usize> {
-        let least = LARGE_GAIN * LARGE_GAIN * self.gain_at_rest();
         let [from, end] =
             [APART * top_hz, Band::end_of(self.rate_hz, top_hz)].map(|hz| self.line_of(hz));
-        let strongest = self.strongest(from..end)?;
-        (self.power_gain[strongest] > least).then_some(strongest)
+        self.strongest(from..end)
+            .filter(|line| self.is_amplified(*line))
+    }
+
+    /// Whether the inverse response at a line is much larger than its static value.
+    fn is_amplified(&self, line: usize) -> bool {
+        self.power_gain[line] > LARGE_GAIN * LARGE_GAIN * self.gain_at_rest()
     }
 
     fn line_of(&self, hz: f64) -> usize {

@@ -4,9 +4,9 @@
 //! (`gap-beside`: the gage still follows the displacement). `soft-gap`: a softer contact carries within it,
 //! `n = −r clamp(x, −g, g)`; with a large `g` this would be an end stop, so `g` is bounded. `joint`: the beam follows
 //! the stator with backlash, `n = w − x` with `w` dragged along at a distance of at most `g` (the play operator of M.
-//! A. Krasnoselskii, A. V. Pokrovskii, *Systems with Hysteresis* (1989)), and the gage shows `x`; `joint-shown`: the gage is
-//! on the beam and shows `w`. `recorded`: the same backlash, but only in what drives the gage. M. Nordin, P.-O. Gutman, *Controlling mechanical systems with backlash*, Automatica 38 (2002),
-//! 1633. **Valid for stiff flanks without impact losses.** Mistaken for `coulomb-friction`, `bouc-wen-hysteresis`, and
+//! A. Krasnoselskii, A. V. Pokrovskii, *Systems with Hysteresis* (1989)), and the gage shows `x`; `joint-shown`: the
+//! gage is on the beam and shows `w`. `recorded`: the same backlash, but only in what drives the gage. M. Nordin, P.-O.
+//! Gutman, *Controlling mechanical systems with backlash*, Automatica 38 (2002), 1633. **Valid for stiff flanks without impact losses.** Mistaken for `coulomb-friction`, `bouc-wen-hysteresis`, and
 //! at one level for `cubic-stiffness`.
 
 use super::{

@@ -5,6 +5,8 @@ use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
+use torqcomp_fourier::rms;
+
 use super::lines::FoundLine;
 use super::spike_trains::{again, find_trains, settle};
 use super::spikes::{LONGEST, SAME, SpikeMoments, SpikeShape, SpikeTrain, TERMS, powers};
@@ -101,23 +103,15 @@ impl SpikeSearch {
         let own = train.shape.train(train.moments, 0..self.samples.len());
         let rest: Vec<f64> = self.samples.iter().zip(own).map(|(y, s)| y - s).collect();
         let filter = prediction_of(rest.iter().copied(), self.order());
-        let power = rest.iter().map(|y| y * y).sum::<f64>() / rest.len() as f64;
-        let std = Self::filtered(rest, filter.clone(), None).std;
-        let is_noise = power < SIGNAL * std * std;
+        let std = rms(&errors(&rest, &filter));
+        let is_noise = rms(&rest).powi(2) < SIGNAL * std * std;
         is_noise.then(|| Self::filtered(self.samples.clone(), filter, Some(std)))
     }
 
     /// With the standard deviation of the unpredictable part, if it is not that of the whole prediction error.
     fn filtered(samples: Vec<f64>, filter: Vec<f64>, std: Option<f64>) -> Self {
-        let order = filter.len() - 1;
-        let mut error = vec![0.0; samples.len()];
-        for (i, e) in error.iter_mut().enumerate().skip(order) {
-            let past = samples[i - order..=i].iter().rev();
-            *e = filter.iter().zip(past).map(|(a, y)| a * y).sum();
-        }
-        let power = error.iter().map(|e| e * e).sum::<f64>();
-        let of_error = (power / samples.len() as f64).sqrt();
-        let std = std.unwrap_or(of_error).max(f64::MIN_POSITIVE);
+        let mut error = errors(&samples, &filter);
+        let std = std.unwrap_or_else(|| rms(&error)).max(f64::MIN_POSITIVE);
         error.iter_mut().for_each(|e| *e /= std);
         let next = |i: usize| filter.iter().zip(&error[i..]).map(|(a, e)| a * e).sum();
         let matched = (0..error.len()).map(next).collect();
@@ -342,6 +336,17 @@ pub fn subtract_spikes(samples: &mut [f64], rate_hz: f64, trains: &[SpikeTrain])
         });
     }
     all
+}
+
+/// Prediction errors of samples, by the coefficients of a prediction error.
+fn errors(samples: &[f64], filter: &[f64]) -> Vec<f64> {
+    let order = filter.len() - 1;
+    let mut errors = vec![0.0; samples.len()];
+    for (i, e) in errors.iter_mut().enumerate().skip(order) {
+        let past = samples[i - order..=i].iter().rev();
+        *e = filter.iter().zip(past).map(|(a, y)| a * y).sum();
+    }
+    errors
 }
 
 /// Coefficients of the prediction error of a record, tapered, as its ends would count as signal of all frequencies.

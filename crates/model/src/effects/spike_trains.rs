@@ -52,8 +52,7 @@ pub(super) fn again(
     moments: &mut [SpikeMoments],
     moves_period: bool,
 ) -> Option<Vec<FoundTrain>> {
-    let trains = records.iter().zip(&*moments).map(|(r, m)| r.train(*m));
-    let first: Vec<FoundTrain> = trains.collect::<Option<_>>()?;
+    let first = trains(records, moments)?;
     let beside = records.iter().zip(&first);
     let beside: Option<Vec<SpikeSearch>> = beside.map(|(r, train)| r.beside_train(train)).collect();
     let Some(records) = beside else {
@@ -62,8 +61,7 @@ pub(super) fn again(
     let mut settled = |is_smooth: bool| {
         moments.iter_mut().for_each(|m| m.is_smooth = is_smooth);
         settle(&records, moments, moves_period);
-        let trains = records.iter().zip(&*moments).map(|(r, m)| r.train(*m));
-        trains.collect::<Option<Vec<FoundTrain>>>()
+        trains(&records, moments)
     };
     let (steep, smooth) = (settled(false)?, settled(true)?);
     let worth = |trains: &[FoundTrain]| -> f64 {
@@ -76,8 +74,12 @@ pub(super) fn again(
     })
 }
 
-/// Moves moments in each record, and the common period, to the largest power explained. The samples in which a spike
-/// changes fast are found once the fractions of samples are known.
+fn trains(records: &[SpikeSearch], moments: &[SpikeMoments]) -> Option<Vec<FoundTrain>> {
+    let both = records.iter().zip(moments);
+    both.map(|(record, m)| record.train(*m)).collect()
+}
+
+/// Moves moments in each record, and the common period, to the largest power explained.
 pub(super) fn settle(records: &[SpikeSearch], moments: &mut [SpikeMoments], moves_period: bool) {
     refine(records, moments, moves_period);
     for (record, m) in records.iter().zip(moments.iter_mut()) {

@@ -1,6 +1,6 @@
 //! Channels of a TDMS file, and their time axes.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use torqcomp_decimal::digits;
@@ -10,7 +10,6 @@ use super::objects::{Properties, Property, TdmsObject, TdmsObjects};
 use super::scales;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
-use crate::recording::choice::contradicted;
 use crate::recording::formats::{Content, NAMED, channel, names_left_out, plausible_rate, stamped};
 use crate::recording::moment::{Moment, date_and_time};
 use crate::recording::text::{ClockOrigin, is_time_name};
@@ -66,7 +65,7 @@ pub(super) fn channels(
     let starts = found.iter().filter_map(|f| f.object.time("wf_start_time"));
     let first_ns = starts.min();
     let times = GroupTimes::of(&found, reading)?;
-    let mut axes: HashMap<usize, TimeAxis> = HashMap::new();
+    let (mut axes, mut used) = (HashMap::new(), HashSet::new());
     let mut made = Vec::new();
     for one in &found {
         let of_header = of_waveform(&one.object, first_ns);
@@ -74,30 +73,27 @@ pub(super) fn channels(
             made.push(of_header);
             continue;
         };
+        let of_header = of_header.filter(|_| reading.time_column.is_none());
         let known = axes.get(&place).cloned();
         let of_stamps = known.map_or_else(|| of_times(&found[place], reading), Ok);
-        let (axis, uses_stamps) = match (of_header, of_stamps) {
-            // Otherwise it is just another channel.
-            (Some(header), Err(_)) if reading.time_column.is_none() => (header, false),
-            (_, Err(failure)) => return Err(failure),
-            (Some(header), Ok(stamps)) if reading.time_column.is_none() => {
-                match contradiction_between(&header, &stamps, one) {
-                    Some(warning) => {
-                        content.warnings.push(warning);
-                        (stamps, true)
-                    }
-                    None => (header, false),
+        if let Ok(stamps) = &of_stamps {
+            axes.insert(place, stamps.clone());
+        }
+        made.push(Some(match (of_header, of_stamps) {
+            // Then it is just another channel.
+            (Some(header), Err(_)) => header,
+            (Some(header), Ok(stamps)) if !contradict(&header, &stamps, one.len()) => header,
+            (of_header, of_stamps) => {
+                used.insert(place);
+                TimeAxis {
+                    header_rate_hz: of_header.and_then(|header| header.rate_hz),
+                    ..of_stamps?
                 }
             }
-            (_, Ok(stamps)) => (stamps, true),
-        };
-        if uses_stamps {
-            axes.insert(place, axis.clone());
-        }
-        made.push(Some(axis));
+        }));
     }
     for (place, (one, axis)) in found.into_iter().zip(made).enumerate() {
-        if axes.contains_key(&place) {
+        if used.contains(&place) {
             continue;
         }
         let name = one.name();
@@ -117,16 +113,11 @@ pub(super) fn channels(
     Ok(())
 }
 
-/// A warning if the rate in the header of a channel is not that of its times. LabVIEW states a step of 1 s for channels
-/// without one.
-fn contradiction_between(
-    header: &TimeAxis,
-    stamps: &TimeAxis,
-    one: &ScaledChannel,
-) -> Option<Warning> {
-    let (stated_hz, stamped_hz) = (header.rate_hz?, stamps.rate_hz?);
-    let found = contradiction(stated_hz, stamped_hz, one.len())?;
-    Some(contradicted(&format!("\"{}\"", one.name()), &found))
+/// Whether the rate in the header of a channel is not that of its times. LabVIEW states a step of 1 s for channels without
+/// one.
+fn contradict(header: &TimeAxis, stamps: &TimeAxis, count: usize) -> bool {
+    let rates = header.rate_hz.zip(stamps.rate_hz);
+    rates.is_some_and(|(stated, stamped)| contradiction(stated, stamped, count).is_some())
 }
 
 /// Channels with scaled values, and the names of those without.

@@ -6,6 +6,8 @@
 mod head;
 mod lines;
 
+use std::collections::{HashMap, HashSet};
+
 use self::head::{Head, field};
 use self::lines::{Lines, numbers_of};
 use torqcomp_decimal::digits;
@@ -93,16 +95,17 @@ fn read(bytes: &mut Bytes, _: &Reading) -> Result<Content, Failure> {
 
 /// Adds the labels of their ordinates to names that several functions have, if the labels differ.
 fn tell_apart(channels: &mut [Channel], labels: &[String]) {
-    let names: Vec<String> = channels
-        .iter()
-        .map(|channel| channel.name.clone())
-        .collect();
-    for (k, channel) in channels.iter_mut().enumerate() {
-        let label = &labels[k];
-        let is_another = |other: usize| names[other] == names[k] && labels[other] != *label;
-        if !label.is_empty() && (0..names.len()).any(is_another) {
-            channel.name = format!("{} {label}", names[k]);
-            channel.heading = channel.heading.replacen(&names[k], &channel.name, 1);
+    let mut labels_of: HashMap<String, HashSet<&str>> = HashMap::new();
+    for (channel, label) in channels.iter().zip(labels) {
+        labels_of
+            .entry(channel.name.clone())
+            .or_default()
+            .insert(label);
+    }
+    for (channel, label) in channels.iter_mut().zip(labels) {
+        if !label.is_empty() && labels_of[&channel.name].len() > 1 {
+            channel.name = format!("{} {label}", channel.name);
+            channel.heading.clone_from(&channel.name);
         }
     }
 }
