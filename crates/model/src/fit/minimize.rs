@@ -83,6 +83,8 @@ struct State<'a> {
     /// Factor of the next increase of the damping.
     rise: f64,
     evaluations: usize,
+    /// Evaluations that the derivatives took.
+    per_jacobian: usize,
 }
 
 /// Outcome of a step.
@@ -128,6 +130,7 @@ impl<'a> State<'a> {
             lambda: FIRST_DAMPING,
             rise: 2.0,
             evaluations: 1 + count,
+            per_jacobian: count,
             evaluated,
             how,
             options,
@@ -231,12 +234,17 @@ impl<'a> State<'a> {
             });
         }
         let small_gain = gain <= tolerance * self.cost && predicted <= tolerance * self.cost;
-        self.accept(trial, residuals, cost, gain / predicted)?;
-        Ok(match (small_gain, moved <= tolerance) {
-            (true, _) => Progress::Ended(StopReason::Reduction),
-            (_, true) => Progress::Ended(StopReason::Step),
-            _ => Progress::Moved,
-        })
+        self.values = trial;
+        self.residuals = residuals;
+        self.cost = cost;
+        // The last derivatives serve for the covariance: the step to here was small, or the fit is unfinished.
+        let is_last = self.evaluations + self.per_jacobian >= self.options.most_evaluations;
+        match (small_gain, moved <= tolerance, is_last) {
+            (true, _, _) => Ok(Progress::Ended(StopReason::Reduction)),
+            (_, true, _) => Ok(Progress::Ended(StopReason::Step)),
+            (_, _, true) => Ok(Progress::Ended(StopReason::Evaluations)),
+            _ => self.go_on(gain / predicted).map(|()| Progress::Moved),
+        }
     }
 
     /// Increases the damping after a step that did not reduce the sum of squares.
@@ -250,20 +258,12 @@ impl<'a> State<'a> {
         }
     }
 
-    /// Accepts a step; the better the predicted gain, the lower the damping becomes.
-    fn accept(
-        &mut self,
-        values: Vec<f64>,
-        residuals: Vec<f64>,
-        cost: f64,
-        ratio: f64,
-    ) -> Result<(), FitError> {
-        let (matrix, count) = jacobian(&self.evaluated, &self.how, &values, &residuals)?;
+    /// Goes on from a step; the better its gain was predicted, the lower the damping becomes.
+    fn go_on(&mut self, ratio: f64) -> Result<(), FitError> {
+        let (matrix, count) = jacobian(&self.evaluated, &self.how, &self.values, &self.residuals)?;
         self.evaluations += count;
-        self.reduced = reduce(&matrix, &residuals);
-        self.values = values;
-        self.residuals = residuals;
-        self.cost = cost;
+        self.per_jacobian = count;
+        self.reduced = reduce(&matrix, &self.residuals);
         self.lambda *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0);
         self.rise = 2.0;
         self.rescale();
