@@ -14,7 +14,7 @@ use super::records::EXCLUDED;
 use super::whitening::Whitening;
 
 /// State of the stand at the first sample of a record, and of its drive.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct InitialState {
     pub motion: MotionState,
     /// Displacement under a constant load that is not in the input.

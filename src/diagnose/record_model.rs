@@ -18,6 +18,9 @@ use super::unexplained::{raw_residual, raw_residuals};
 const STATE_STEP: f64 = 1e-4;
 /// Minimum number of samples that determine a state.
 const FEWEST: usize = 6;
+/// Correction of an initial state, relative to the RMS residual, below which its residual, from which the correction is
+/// taken off linearly, is that of the optimum.
+const STATE_FOUND: f64 = 1e-3;
 /// Fractions tried of a step to a better initial state.
 const STEPS: [f64; 3] = [1.0, 0.3, 0.1];
 
@@ -138,7 +141,9 @@ impl RecordModel {
             false => self.shown_at_first(record, own.as_ref()),
         };
         let others = [Some(InitialState::default()), shown];
-        let others = others.into_iter().flatten().filter_map(from);
+        let others = others.into_iter().flatten();
+        let others = others.filter(|initial| *initial != record.initial);
+        let others = others.filter_map(from);
         let found = own
             .into_iter()
             .chain(others)
@@ -146,6 +151,9 @@ impl RecordModel {
         let mut found = found?;
         for _ in 0..MOST_STARTS {
             let sum = found.sum_of_squares();
+            if found.has_its_state() {
+                break;
+            }
             let better = STEPS.into_iter().find_map(|part| {
                 let next = self.residual(self.stepped(&found, part))?;
                 (next.sum_of_squares() < sum).then_some(next)
@@ -208,6 +216,16 @@ impl RecordModel {
         let preload = record.initial.preload + part * found.nuisance.preload.unwrap_or(0.0);
         record.initial.preload = preload.clamp(-limit, limit);
         record
+    }
+}
+
+impl RecordResidual {
+    /// Whether another step would not change its initial state.
+    fn has_its_state(&self) -> bool {
+        let [x, speed] = self.nuisance.motion.unwrap_or_default();
+        let correction = x.hypot(speed).hypot(self.nuisance.preload.unwrap_or(0.0));
+        let mean_square = self.sum_of_squares() / self.samples.len() as f64;
+        correction <= STATE_FOUND * mean_square.sqrt()
     }
 }
 
