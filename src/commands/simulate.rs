@@ -14,7 +14,7 @@ use crate::io::{ChannelChoice, Flags, Input};
 use crate::outcome::{Made, RecordFigures};
 use crate::print::{Report, enumeration, plural, short};
 use crate::recording::moment::Moment;
-use crate::recording::{AlignedChannels, Channel, ChannelStream, UniformStream, resampled};
+use crate::recording::{Channel, ChannelStream, UniformStream};
 use crate::stand::{self, Calibration, Stand, TransducerSignal};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
@@ -72,7 +72,7 @@ pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
     let units = ChannelUnits::of(&stand, applied.channel.recorded(), &mut of_channel)?;
     let chain = stand.chain()?;
     let between = args.between.into();
-    let axis = applied.axis();
+    let axis = applied.axis;
     output.write(format!("time_s,measured [{}]\n", units.measured_text).as_bytes())?;
     let mut written = 0;
     let mut deliver = |simulated: &mut Vec<f64>| {
@@ -139,7 +139,7 @@ fn simulate_steady(
         return Err(too_short());
     }
     samples.iter_mut().for_each(|u| *u *= factor);
-    let steady = steady_answer(chain, samples, applied.axis().0, between);
+    let steady = steady_answer(chain, samples, applied.axis.0, between);
     let (mut record, steps) = steady.map_err(Failure::of(ErrorCode::InvalidStand))?;
     deliver(&mut record)?;
     Ok(steps)
@@ -175,81 +175,48 @@ fn simulate(
 /// The applied quantity as read, in the unit of the file.
 struct AppliedInput {
     channel: Channel,
+    /// Samples per second, and the time of the first sample.
     axis: (f64, Moment),
     /// Standard uncertainty of the rate, if it comes from stamps.
     rate_std_hz: Option<f64>,
-    samples: AppliedSamples,
+    /// Until its end.
+    stream: Option<Box<UniformStream>>,
     /// Warnings about the file after reading all of it; losses come first.
     warnings: Vec<Warning>,
     is_lossy: bool,
 }
 
-/// Source of the samples: messages with non-uniform time stamps are interpolated in memory.
-enum AppliedSamples {
-    Text(Option<Box<UniformStream>>),
-    Messages(Vec<f64>),
-}
-
 impl AppliedInput {
     fn open(args: &cli::Simulate) -> Result<Self, Failure> {
-        let input = Input::of(args.input());
         let flags = Flags {
             channel: "--applied",
             unit: Some("--unit"),
         };
         let choice = ChannelChoice::of(flags, args.applied.as_deref(), args.unit.as_deref());
-        if !input.is_mcap()? {
-            let stream = ChannelStream::open(&input, &choice, &args.reading)?;
-            return Ok(Self {
-                channel: stream.channel.clone(),
-                axis: (stream.rate_hz, stream.start),
-                rate_std_hz: stream.channel.axis.rate_std_hz,
-                samples: AppliedSamples::Text(Some(Box::new(UniformStream::of(stream)?))),
-                warnings: Vec::new(),
-                is_lossy: false,
-            });
-        }
-        let mut read = AlignedChannels::read(&input, &[choice], &args.reading)?;
-        let mut chosen = read.channels.swap_remove(0);
-        if chosen.samples.len() < 2 {
-            return Err(too_short());
-        }
+        let stream = ChannelStream::open(&Input::of(args.input()), &choice, &args.reading)?;
+        let channel = stream.channel.clone();
+        let stream = UniformStream::of(stream)?;
         Ok(Self {
-            axis: (read.rate_hz, read.start),
-            rate_std_hz: read.rate_std_hz,
-            samples: AppliedSamples::Messages(std::mem::take(&mut chosen.samples)),
-            channel: chosen,
-            warnings: read.warnings,
-            is_lossy: read.is_lossy,
+            axis: (stream.rate_hz, stream.start),
+            rate_std_hz: stream.rate_std_hz,
+            channel,
+            stream: Some(Box::new(stream)),
+            warnings: Vec::new(),
+            is_lossy: false,
         })
-    }
-
-    /// Samples per second, and the time of the first sample.
-    fn axis(&self) -> (f64, Moment) {
-        self.axis
     }
 
     /// Appends the next samples; `false` with the last of them.
     fn next(&mut self, samples: &mut Vec<f64>) -> Result<bool, Failure> {
-        let stream = match &mut self.samples {
-            AppliedSamples::Messages(all) => {
-                samples.append(all);
-                return Ok(false);
-            }
-            AppliedSamples::Text(stream) => stream,
-        };
-        if let Some(open) = stream
-            && open.next(samples, |_| Ok(()))?
+        if let Some(stream) = &mut self.stream
+            && stream.next(samples, |_| Ok(()))?
         {
             return Ok(true);
         }
-        if let Some(ended) = stream.take() {
-            let (summary, done) = ended.finish(samples)?;
+        if let Some(ended) = self.stream.take() {
+            let (summary, _) = ended.finish(samples)?;
             self.is_lossy = summary.lost.is_some();
             self.warnings = summary.all_warnings();
-            let was = ["was", "are not uniform"];
-            let told = done.map(|done| resampled(&self.channel.name, was, self.axis, &done));
-            self.warnings.extend(told);
         }
         Ok(false)
     }

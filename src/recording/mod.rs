@@ -38,7 +38,7 @@ use crate::io::{ChannelChoice, HEAD, Input, Reading};
 use crate::unit::NamedUnit;
 use crate::warning::Warning;
 
-pub(crate) use aligned::{AlignedChannels, resampled};
+pub(crate) use aligned::AlignedChannels;
 pub use all_samples::AllSamples;
 pub(crate) use axis::without_rounding;
 pub use axis::{REVERSED, RateFrom, TimeAxis, falls, seconds_assumed, typical_step};
