@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 
 use serde_json::Value;
 
+use crate::reports::highest;
 use crate::util::{COMPENSATE, Folder, HARMONICS, assert_close};
 
 const MECHANICS: &str = "schema = \"torqcomp.stand/1\"\n[mechanics]\n\
@@ -214,22 +215,29 @@ fn a_torque_far_off_the_rated_one_is_warned_about() {
 /// effects.
 #[test]
 fn a_loss_in_the_material_is_part_of_the_gain() {
-    let effect = "[[effects]]\nkind = \"structural-damping\"\nloss_factor = 0.05\n";
-    let folder = folder("T [N m]", effect);
-    let args = [&COMPENSATE[..], &["--band", "600", "--json", "--force"]].concat();
-    let report = folder.json(&args);
-    let points = report["noise"]["gain"].as_array().unwrap();
-    assert!(points.len() > 2);
-    for point in points {
-        let s = point["frequency_hz"].as_f64().unwrap() / 590.0;
-        let loss = if s > 0.0 { 0.05 } else { 0.0 };
-        let gain = (1.0 - s * s).hypot(2.0 * 0.02 * s + loss);
-        assert_close(point["gain"].as_f64().unwrap(), gain, 1e-6);
+    for loss_factor in [0.05, 0.5] {
+        let effect =
+            format!("[[effects]]\nkind = \"structural-damping\"\nloss_factor = {loss_factor}\n");
+        let folder = folder("T [N m]", &effect);
+        let more = ["--band", "600", "--json", "--force", "--html", "page.html"];
+        let report = folder.json(&[&COMPENSATE[..], &more].concat());
+        let points = report["noise"]["gain"].as_array().unwrap();
+        assert!(points.len() > 2);
+        let mut largest: f64 = 0.0;
+        for point in points {
+            let s = point["frequency_hz"].as_f64().unwrap() / 590.0;
+            let loss = if s > 0.0 { loss_factor } else { 0.0 };
+            let gain = (1.0 - s * s).hypot(2.0 * 0.02 * s + loss);
+            assert_close(point["gain"].as_f64().unwrap(), gain, 1e-6);
+            largest = largest.max(gain);
+        }
+        assert!(
+            report["warnings"].to_string().contains("ends-felt-far"),
+            "{report}"
+        );
+        let (_, shown) = highest(&folder.read("page.html"), "Torque per recorded", 0);
+        assert_close(shown, largest, 2e-3);
     }
-    assert!(
-        report["warnings"].to_string().contains("ends-felt-far"),
-        "{report}"
-    );
 }
 
 /// A series capacitor does not pass the mean of 2 N m.

@@ -239,11 +239,14 @@ impl Plan {
         }
     }
 
+    /// Gain of what the filter does not divide out.
+    fn gain_beside_filter(&self, frequency_hz: f64) -> f64 {
+        let undo = self.undo.as_ref();
+        undo.map_or(1.0, |undo| undo.gain_beside_filter(frequency_hz))
+    }
+
     fn noise(&self) -> NoiseReport {
-        let beside = |frequency_hz: f64| {
-            let undo = self.undo.as_ref();
-            undo.map_or(1.0, |undo| undo.gain_beside_filter(frequency_hz))
-        };
+        let beside = |frequency_hz| self.gain_beside_filter(frequency_hz);
         let gain = NoiseGain::of(&self.filter, beside, GAIN_POINTS);
         let at = |&(frequency_hz, gain): &(f64, f64)| {
             let std = self.std(frequency_hz);

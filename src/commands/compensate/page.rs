@@ -50,9 +50,10 @@ impl PageData {
         let point = |i: usize| {
             let frequency_hz = plan.filter.band().end_hz() * i as f64 / GAINS as f64;
             let std = plan.std(frequency_hz);
+            let beside = plan.gain_beside_filter(frequency_hz);
             GainPoint {
                 frequency_hz,
-                gain: plan.filter.response(frequency_hz).norm(),
+                gain: plan.filter.response(frequency_hz).norm() * beside,
                 gain_relative_std: std.total.or(std.response).map(|u| u.magnitude_relative),
             }
         };
