@@ -326,6 +326,29 @@ fn a_multiple_of_the_speed_is_said() {
     }
 }
 
+/// The stand's resonance amplifies one order more than ten times: as torque, it is not the largest line.
+#[test]
+fn a_resonance_does_not_hide_lines_between_orders() {
+    let folder = Folder::new();
+    let parts = [
+        (0.0, 0.0, 0.0),
+        (0.4, 98.3, 0.3),
+        (0.8, 294.9, 2.0),
+        (0.5, 589.8, -1.0),
+    ];
+    let (mut shown, _) = steady(&parts, 20_000.0, 30_000);
+    let mut noise = Noise(5);
+    shown
+        .iter_mut()
+        .for_each(|x| *x += 0.01 * (noise.uniform() - 0.5));
+    folder.write("in.csv", record(&shown, 20_000.0));
+    let more = ["196.6", "--orders", "1-3", "--json"];
+    let report = folder.json(&[&HARMONICS[..], &more].concat());
+    let told = messages(&report, "lines-between-orders");
+    assert_eq!(told.len(), 1, "{report}");
+    assert!((advised(&told[0]) / 98.3 - 1.0).abs() < 1e-5, "{told:?}");
+}
+
 /// Where no line between the orders shows the multiple, such as a single one elsewhere, nothing says that the speed
 /// changes: no order is there.
 #[test]

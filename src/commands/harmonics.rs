@@ -306,7 +306,7 @@ fn of_orders(
     let is_given = fundamental.std_hz.is_none();
     let load = speed::load_changes(record, hz, orders);
     // A load step leaves slow components that bias the speed slightly.
-    let multiple = multiple::warning(record, hz, orders);
+    let multiple = multiple::warning(record, hz, orders, |hz| way.inverse(hz).norm());
     let changing = match &multiple {
         Some(_) => None,
         None => speed::warning(record, hz, orders),

@@ -12,14 +12,16 @@ use crate::warning::Warning;
 const PARTS: [u32; 2] = [2, 3];
 /// Number of multiples of the speed that are searched, at most.
 const MULTIPLES: u32 = 8;
-/// Amplitude of a line between the orders, relative to the largest of all.
+/// Amplitude of a line between the orders, as torque, relative to the largest of all.
 const STRONG: f64 = 0.2;
 
-/// A warning if lines between the orders are multiples of half or a third of the fundamental.
+/// A warning if lines between the orders are multiples of half or a third of the fundamental; `inverse` is the torque per
+/// recorded amplitude at a frequency, so that the resonance does not hide them.
 pub(super) fn warning(
     record: &UniformRecord,
     fundamental_hz: f64,
     orders: &[f64],
+    inverse: impl Fn(f64) -> f64,
 ) -> Option<Warning> {
     let is_whole = |order: &f64| (order - order.round()).abs() < 1e-6;
     let length = record.samples.count().min(FIRST);
@@ -28,7 +30,10 @@ pub(super) fn warning(
         return None;
     }
     let samples = record.samples.part(0..length).ok()?;
-    let of_part = |part: &u32| of_part(&samples, record.rate_hz, (fundamental_hz, *part), orders);
+    let of_part = |part: &u32| {
+        let both = (fundamental_hz, *part);
+        of_part(&samples, record.rate_hz, both, orders, &inverse)
+    };
     PARTS.iter().find_map(of_part)
 }
 
@@ -38,6 +43,7 @@ fn of_part(
     rate_hz: f64,
     (fundamental_hz, part): (f64, u32),
     orders: &[f64],
+    inverse: &impl Fn(f64) -> f64,
 ) -> Option<Warning> {
     let start_hz = fundamental_hz / f64::from(part);
     let is_seen = |k: &u32| f64::from(*k) * start_hz * (1.0 + SPAN) < 0.5 * rate_hz;
@@ -48,15 +54,12 @@ fn of_part(
     let all: Vec<f64> = whole.into_iter().map(f64::from).chain(between).collect();
     let speed = Fundamental::given(found.frequency_hz);
     let fitted = fit(samples, rate_hz, 0.0, speed, &all).ok()?;
-    let size = |c: &Component| c.phasor.norm();
-    let largest = fitted.components.iter().map(size).fold(0.0, f64::max);
+    let size = |c: &Component| c.phasor.norm() * inverse(c.frequency_hz);
+    let sure = || fitted.components.iter().filter(|c| is_sure(c));
+    let largest = sure().map(size).fold(0.0, f64::max);
     let is_between = |c: &&Component| c.order % f64::from(part) != 0.0;
-    let is_strong = |c: &&Component| is_sure(c) && size(c) > STRONG * largest;
-    let strong = fitted
-        .components
-        .iter()
-        .filter(is_between)
-        .filter(is_strong);
+    let strong = sure().filter(is_between);
+    let strong = strong.filter(|c| size(c) > STRONG * largest);
     let strong: Vec<f64> = strong.map(|c| c.order).collect();
     // A single line is a multiple by chance if it is not at the speed itself, or near it and the orders are there.
     let resolution_hz = rate_hz / samples.len() as f64;
