@@ -159,6 +159,23 @@ impl SearchState {
         best.is_some()
     }
 
+    /// Refits the model from other starts of its effects while something is left, and returns whether that explains more:
+    /// without the effects found later, the search may have ended at a bound, or on the wrong side of zero.
+    pub(super) fn restart(&mut self, coarse: usize, workers: Workers) -> bool {
+        if !self.settled || !self.is_worthwhile(&self.after, &self.tests) {
+            return false;
+        }
+        let fitted = &self.after.fitted;
+        let starts = from_other_starts(&fitted.structure, &fitted.values);
+        let best = self.best_from(&starts, workers, |model| {
+            model.criterion() < self.after.criterion() - SAME
+        });
+        if let Some(best) = &best {
+            self.take(best, coarse);
+        }
+        best.is_some()
+    }
+
     /// The best model with a gain error and another form of an effect, if it is better.
     fn with_gain(&self, workers: Workers) -> Option<ScoredModel> {
         let gain = listed(&self.after.fitted.structure).find(|effect| effect.name == GAIN);
@@ -199,6 +216,29 @@ impl SearchState {
         let passing = models.into_iter().filter(passes);
         passing.min_by(|a, b| a.criterion().total_cmp(&b.criterion()))
     }
+}
+
+/// The structure with the start values of its forms for one of the added effects, except for their sizes.
+fn from_other_starts(structure: &Structure, values: &[f64]) -> Vec<(Structure, Vec<f64>)> {
+    let mut next = structure.context.plain_count();
+    let mut starts: Vec<(Structure, Vec<f64>)> = Vec::new();
+    for (k, effect) in structure.effects.iter().enumerate() {
+        let from = next;
+        next += effect.moved();
+        if k < structure.declared || effect.is_line() {
+            continue;
+        }
+        for start in effect.form.starts {
+            let mut values = values.to_vec();
+            let shape = (0..effect.moved()).filter(|i| Some(*i) != effect.size());
+            shape.for_each(|i| values[from + i] = start[i]);
+            if starts.iter().all(|(_, other)| *other != values) {
+                starts.push((structure.clone(), values));
+            }
+        }
+    }
+    starts.retain(|(_, start)| start != values);
+    starts
 }
 
 /// Structures in which one of the added effects of the stand has another form, and start values with the same stiffness.

@@ -73,7 +73,10 @@ impl SearchState {
         }
         // Once an effect that only resembled another is gone, what it hid may appear, and be exchanged
         // in turn.
-        while self.exchange(coarse, workers) | self.exchange_with_gain(coarse, workers) {
+        while self.restart(coarse, workers)
+            | self.exchange(coarse, workers)
+            | self.exchange_with_gain(coarse, workers)
+        {
             let count = self.after.effect_names().len();
             while self.has_room() && self.add_another(coarse, workers) {}
             if self.after.effect_names().len() == count {

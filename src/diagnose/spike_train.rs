@@ -52,8 +52,17 @@ pub fn train_rate_hz(residuals: &[RecordResidual]) -> Option<f64> {
     let by_intervals = spike_rate_hz(residuals).map(|hz| (rate_hz / hz, longest));
     let trains = [by_spectrum, by_intervals].into_iter().flatten();
     let found = trains.filter_map(|(period, known)| {
-        let search = plain.iter().map(|samples| SpikeSearch::of(samples, period));
-        let found = find_trains(&search.collect::<Vec<_>>(), period, known)?;
+        let near = |period: f64| {
+            let search = plain.iter().map(|samples| SpikeSearch::of(samples, period));
+            find_trains(&search.collect::<Vec<_>>(), period, known)
+        };
+        let mut found = near(period)?;
+        let all: usize = plain.iter().map(Vec::len).sum();
+        let is_enough = 2.0 * period * FEWEST as f64 <= all as f64;
+        if is_enough && found.iter().any(|train| !train.is_steady) {
+            // Every other place may be empty.
+            found = near(2.0 * period)?;
+        }
         let is_everywhere = found.iter().all(|train| train.share() > 0.0);
         let period = found.first()?.moments.period;
         let of_input = residuals.iter().any(|r| is_periodic(&r.record, period));

@@ -23,8 +23,8 @@ const BINS: usize = 4;
 const FIRST_SAMPLES: usize = 4096;
 /// Smallest relative change of a sum of squares that counts.
 const OPEN: f64 = 1e-9;
-/// Least part of a typical spike in the mean one: outliers that happen to be a multiple of a period apart leave most
-/// of the places empty.
+/// Least part of a typical spike in the mean one, and of every other one: outliers that happen to be a multiple of a
+/// period apart leave most of the places empty.
 const TYPICAL: f64 = 0.5;
 /// Power of a train, in variances of a sample, that chance reaches at the best of many moments beyond one for each
 /// coefficient of its shape.
@@ -47,7 +47,7 @@ pub struct FoundTrain {
     pub power: f64,
     /// Power that chance and the signal reach at other periods.
     pub chance: f64,
-    /// Whether the typical spike is like the mean one.
+    /// Whether the typical spike, and every other one, is like the mean one.
     pub is_steady: bool,
 }
 
@@ -287,8 +287,13 @@ impl SpikeSearch {
                     .sum()
             })
             .collect();
+        let mean = |first: usize, step: usize| {
+            let some = parts.iter().skip(first).step_by(step);
+            some.sum::<f64>() / parts.len().saturating_sub(first).div_ceil(step) as f64
+        };
+        // At twice the rate of a train, every other place is empty.
+        let (mean, alternate) = (mean(0, 1), mean(0, 2).min(mean(1, 2)));
         parts.sort_by(f64::total_cmp);
-        let mean = parts.iter().sum::<f64>() / parts.len() as f64;
         let typical = parts.get(parts.len() / 2).copied().unwrap_or(0.0);
         let in_units = |own: [f64; TERMS]| own.map(|c| c * self.std);
         let chance = CHANCE + moments.column_count() as f64;
@@ -299,7 +304,7 @@ impl SpikeSearch {
             },
             power,
             chance: self.beside(moments).max(chance),
-            is_steady: mean > 0.0 && typical >= TYPICAL * mean,
+            is_steady: mean > 0.0 && typical.min(alternate) >= TYPICAL * mean,
         })
     }
 }
