@@ -248,6 +248,20 @@ pub(crate) fn list(items: impl IntoIterator<Item = String>) -> String {
     enumeration(&items.into_iter().collect::<Vec<_>>(), "or")
 }
 
+/// The first `most` of `count` items, and the number of further ones: `a, b and 7 more`.
+pub(crate) fn some_of<T: ToString>(
+    items: impl IntoIterator<Item = T>,
+    count: usize,
+    most: usize,
+) -> String {
+    let first = items.into_iter().take(most);
+    let first: Vec<String> = first.map(|item| item.to_string()).collect();
+    match count.saturating_sub(most) {
+        0 => first.join(", "),
+        more => format!("{} and {more} more", first.join(", ")),
+    }
+}
+
 /// `a, b and c`, with the given word before the last item.
 pub(crate) fn enumeration<T: AsRef<str>>(items: &[T], word: &str) -> String {
     let items: Vec<&str> = items.iter().map(T::as_ref).collect();

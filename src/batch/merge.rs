@@ -9,12 +9,12 @@ use serde::Serialize;
 
 use super::last_run::LastRun;
 use super::manifest::{MadeFrom, ManifestEntry};
-use super::summary;
+use super::summary::{self, LISTED};
 use crate::cli::many::Shard;
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::ShowPath;
 use crate::outcome::Outcome;
-use crate::print::{Report, plural};
+use crate::print::{Report, plural, some_of};
 
 /// Number of displayed digits of a SHA-256.
 const SUM_DIGITS: usize = 12;
@@ -171,7 +171,7 @@ fn unfinished(run: &LastRun) -> Option<MergeProblem> {
     let missing = run.not_done.len();
     let which = match missing {
         0 => String::new(),
-        _ => format!(" ({})", summary::some_of(&run.not_done, missing)),
+        _ => format!(" ({})", some_of(&run.not_done, missing, LISTED)),
     };
     let all = plural(run.begin.files.len() as u64, "recording");
     if !run.has_ended {
@@ -293,7 +293,7 @@ fn missing_parts(runs: &[LastRun]) -> Option<MergeProblem> {
         manifest: None,
         message: format!(
             "no manifest of {}, with {recordings} of {}; run them (--shard {next}), or give their manifests too",
-            summary::some_of(missing, parts),
+            some_of(missing, parts, LISTED),
             plural(all as u64, "recording")
         ),
     })
@@ -355,7 +355,7 @@ fn differing_results([first, other]: [&String; 2], files: &[String]) -> MergePro
             "{other}: the results of {} differ from those in {first}: {}; omit the outdated manifest, or run these \
              recordings again",
             plural(files.len() as u64, "recording"),
-            summary::some_of(files, files.len())
+            some_of(files, files.len(), LISTED)
         ),
     }
 }

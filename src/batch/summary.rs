@@ -14,7 +14,7 @@ use crate::file_name::ShowPath;
 use crate::io::output::{self, Output};
 use crate::io::storage::Stored;
 use crate::outcome::Outcome;
-use crate::print::{self, plural, rounded};
+use crate::print::{self, plural, rounded, some_of};
 use crate::progress::{Amount, rate};
 
 /// Headings of the CSV file.
@@ -35,7 +35,7 @@ const HEADINGS: [&str; 12] = [
 /// Significant digits in the CSV file.
 const DIGITS: u32 = 12;
 /// Maximum number of files of one kind that are listed.
-const LISTED: usize = 10;
+pub(super) const LISTED: usize = 10;
 
 /// Name and version of the document of a run.
 pub(crate) const SCHEMA: &str = "torqcomp.batch/1";
@@ -186,7 +186,7 @@ impl BatchResult<'_> {
         text += &warnings(self.entries(), &self.plan.manifest.shown().to_string());
         let left_out = &self.plan.left_out;
         if !left_out.is_empty() {
-            let names = some_of(left_out, left_out.len());
+            let names = some_of(left_out, left_out.len(), LISTED);
             text += &format!("skipped, not recordings judging by their content: {names}\n");
         }
         if self.plan.history.unread > 0 {
@@ -300,17 +300,6 @@ fn failures<'a>(entries: impl Iterator<Item = &'a ManifestEntry>) -> String {
         }
     };
     entries.filter(|entry| entry.exit != 0).map(line).collect()
-}
-
-/// The first of `count` names, and the number of further ones.
-pub(super) fn some_of<T: ToString>(names: impl IntoIterator<Item = T>, count: usize) -> String {
-    let more = match count.saturating_sub(LISTED) {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
-    let first = names.into_iter().take(LISTED);
-    let first: Vec<String> = first.map(|name| name.to_string()).collect();
-    format!("{}{more}", first.join(", "))
 }
 
 /// The outcome of a recording, as a word.

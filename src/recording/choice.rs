@@ -14,7 +14,7 @@ use super::text::CELLS_WITH_UNITS;
 use super::{Channel, Hole, HoleKind, RateFrom, Recording, check_holes, check_size, formats};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading, already_compensated};
-use crate::print::{enumeration, list, plural};
+use crate::print::{enumeration, list, plural, some_of};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
@@ -156,13 +156,10 @@ pub(super) fn by_part(channels: &[Label], wanted: &str) -> Result<Option<usize>,
 
 /// The names, with a word before the last one; of many, the first and the number of further ones.
 fn named(names: impl ExactSizeIterator<Item = String>, word: &str) -> String {
-    let more = names.len().saturating_sub(NAMED);
-    match more {
-        0 => enumeration(&names.collect::<Vec<_>>(), word),
-        _ => {
-            let first: Vec<String> = names.take(NAMED).collect();
-            format!("{} and {more} more", first.join(", "))
-        }
+    let count = names.len();
+    match count > NAMED {
+        false => enumeration(&names.collect::<Vec<_>>(), word),
+        true => some_of(names, count, NAMED),
     }
 }
 

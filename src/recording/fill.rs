@@ -10,7 +10,7 @@ use super::memory_stream::used_stamps;
 use super::{Hole, HoleKind, Recording};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::{Fill, Reading};
-use crate::print::plural;
+use crate::print::{plural, some_of};
 use crate::warning::Warning;
 
 /// Number of intervals listed in a warning.
@@ -151,22 +151,16 @@ fn said(
         Fill::Hold => "the last preceding value",
         _ => "straight lines",
     };
-    let shown = spans.iter().take(SAID);
-    let shown: Vec<String> = shown
-        .map(|span| format!("{} to {}", time(span.from_s), time(span.to_s)))
-        .collect();
-    let more = match spans.len().saturating_sub(SAID) {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
+    let each = spans.iter();
+    let each = each.map(|span| format!("{} to {}", time(span.from_s), time(span.to_s)));
+    let shown = some_of(each, spans.len(), SAID);
     (count > 0).then(|| {
         Warning::new(
             "filled",
             format!(
-                "\"{name}\": {} at {} filled with {how}: {}{more}; do not trust the result there",
+                "\"{name}\": {} at {} filled with {how}: {shown}; do not trust the result there",
                 plural(count, "missing sample"),
                 plural(spans.len(), "place"),
-                shown.join(", ")
             ),
         )
     })

@@ -6,7 +6,7 @@ use torqcomp_model::effects::{Action, FoundLine, Unrecovered};
 use super::report::{CompensateReport, LostSpan, RemovedLine, UndoneEffect};
 use crate::failure::{ErrorCode, Failure};
 use crate::inverse::{Carried, ChainInverse, InverseResult, RecordWindow, Spread};
-use crate::print::{plural, rounded};
+use crate::print::{plural, rounded, some_of};
 use crate::recording::UniformRecord;
 use crate::stand::{ConstantStd, Stand};
 use crate::warning::Warning;
@@ -259,23 +259,16 @@ fn spans(samples: &[usize], scales: &Scales) -> Vec<[f64; 2]> {
 }
 
 fn lost_warning(effect: &str, lost: &Unrecovered, spans: &[[f64; 2]], scales: &Scales) -> Warning {
-    let told: Vec<String> = spans
-        .iter()
-        .take(SPANS_TOLD)
-        .map(|[from, to]| format!("{} to {} s", rounded(*from, 7), rounded(*to, 7)))
-        .collect();
-    let more = match spans.len().saturating_sub(SPANS_TOLD) {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
+    let told = spans.iter();
+    let told = told.map(|[from, to]| format!("{} to {} s", rounded(*from, 7), rounded(*to, 7)));
     Warning::new(
         "not-recovered",
         format!(
-            "{}: {}; {}, from {}{more}: within {} ms of {} the torque is not recovered",
+            "{}: {}; {}, from {}: within {} ms of {} the torque is not recovered",
             effect,
             lost.why,
             plural(lost.samples.len(), "sample"),
-            told.join(", "),
+            some_of(told, spans.len(), SPANS_TOLD),
             rounded(1e3 * scales.reach_s, 2),
             if lost.samples.len() == 1 {
                 "it"

@@ -11,7 +11,7 @@ use super::band::BandReport;
 use super::statistics::Statistics;
 use crate::inverse::ResultStd;
 use crate::outcome::RecordFigures;
-use crate::print::{Report, plural, rounded, short};
+use crate::print::{Report, plural, rounded, short, some_of};
 use crate::recording::FilledSpan;
 use crate::recording::moment::Moment;
 use crate::stand::{ConstantStd, RecordedLevels};
@@ -369,16 +369,16 @@ impl CompensateReport {
     }
 
     fn filled_text(&self) -> String {
-        let each = self.filled.iter().take(LISTED).map(|span| {
+        let each = self.filled.iter().map(|span| {
             let [from, to] = [span.from_s, span.to_s].map(|s| self.time_text(s));
             format!("{from} to {to} ({})", span.samples)
         });
-        let each: Vec<String> = each.collect();
-        let more = match self.filled.len().saturating_sub(LISTED) {
-            0 => String::new(),
-            more => format!(" and {more} more, which --json lists"),
+        let listed = match self.filled.len() > LISTED {
+            true => ", which --json lists",
+            false => "",
         };
-        self.filled_with(&format!(": {}{more}", each.join(", ")))
+        let some = some_of(each, self.filled.len(), LISTED);
+        self.filled_with(&format!(": {some}{listed}"))
     }
 
     fn effects_text(&self) -> String {

@@ -9,6 +9,7 @@ use super::content::Content;
 use super::report::{ChannelWarning, Detail, InspectedChannel, InspectedFile};
 use super::whole;
 use crate::parallel::{parallel, threads};
+use crate::print::some_of;
 use crate::quality::{self, Findings, TimeFindings, copies, labels, unit_of};
 use crate::recording::moment::Moment;
 use crate::recording::text::Clock;
@@ -199,17 +200,8 @@ fn gathered(warnings: Vec<ChannelWarning>) -> Vec<ChannelWarning> {
 
 /// Some names, for people.
 fn listed(names: &[String]) -> String {
-    const MOST: usize = 6;
-    let quoted: Vec<String> = names
-        .iter()
-        .take(MOST)
-        .map(|n| format!("\"{n}\""))
-        .collect();
-    if names.len() > MOST {
-        format!("{} and {} more", quoted.join(", "), names.len() - MOST)
-    } else {
-        quoted.join(", ")
-    }
+    let quoted = names.iter().map(|n| format!("\"{n}\""));
+    some_of(quoted, names.len(), 6)
 }
 
 fn describe(channel: &Channel, found: &Findings, time: Option<&TimeFindings>) -> InspectedChannel {

@@ -4,6 +4,7 @@ use super::path::{self, PathPart, Slice};
 use super::schema::leaves::{self, Leaf};
 use super::schema::{Field, FieldKind, Number, Schema};
 use crate::failure::did_you_mean;
+use crate::print::some_of;
 
 /// Path to a field through fields, by their names, and its type.
 pub(super) fn way<'a>(schema: &'a Schema, names: &[&str]) -> Option<(Vec<Hop>, &'a FieldKind)> {
@@ -113,15 +114,9 @@ fn list(found: &[Leaf]) -> String {
     if found.is_empty() {
         return "there is no number in its messages".to_owned();
     }
-    let shown = found.iter().take(LISTED);
-    let shown: Vec<_> = shown
-        .map(|leaf| format!("{} ({})", leaf.path, leaf.number.name()))
-        .collect();
-    let more = match found.len().saturating_sub(LISTED) {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
-    format!("there are: {}{more}", shown.join(", "))
+    let each = found.iter();
+    let each = each.map(|leaf| format!("{} ({})", leaf.path, leaf.number.name()));
+    format!("there are: {}", some_of(each, found.len(), LISTED))
 }
 
 struct RouteWalk<'a> {

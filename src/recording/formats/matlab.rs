@@ -201,7 +201,7 @@ fn read(bytes: &mut Bytes, reading: &Reading) -> Result<Content, Failure> {
         }
     }
     channels(variables, reading, &mut content, &mut left_out)?;
-    content.warnings.extend(names_left_out(left_out));
+    content.warnings.extend(names_left_out(&left_out));
     Ok(content)
 }
 

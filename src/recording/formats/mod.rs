@@ -18,6 +18,7 @@ use super::text::is_time_name;
 use super::{Channel, Hole, HoleKind, Recording, TimeAxis};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::{ChannelChoice, Reading, names_compensated};
+use crate::print::some_of;
 use crate::unit::{NamedUnit, OF_FULL_SCALE};
 use crate::warning::Warning;
 
@@ -25,17 +26,10 @@ use crate::warning::Warning;
 const NAMED: usize = 10;
 
 /// Warning about channels that were left out, each with the reason.
-fn names_left_out(mut left_out: Vec<String>) -> Option<Warning> {
-    if left_out.is_empty() {
-        return None;
-    }
-    let more = match left_out.len().saturating_sub(NAMED) {
-        0 => String::new(),
-        more => format!(" and {more} more"),
-    };
-    left_out.truncate(NAMED);
-    let message = format!("left out: {}{more}", left_out.join(", "));
-    Some(Warning::new("left-out", message))
+fn names_left_out(left_out: &[String]) -> Option<Warning> {
+    let names = some_of(left_out, left_out.len(), NAMED);
+    let message = format!("left out: {names}");
+    (!left_out.is_empty()).then(|| Warning::new("left-out", message))
 }
 
 /// A format.

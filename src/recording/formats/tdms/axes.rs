@@ -109,7 +109,7 @@ pub(super) fn channels(
             .channels
             .push(channel(&name, unit, one.values, axis));
     }
-    content.warnings.extend(names_left_out(left_out));
+    content.warnings.extend(names_left_out(&left_out));
     Ok(())
 }
 

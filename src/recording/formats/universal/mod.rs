@@ -13,12 +13,11 @@ use self::lines::{Lines, numbers_of};
 use torqcomp_decimal::digits;
 
 use super::bytes::{Bytes, Order};
-use super::{Content, Format, channel, cut, stamped};
+use super::{Content, Format, channel, cut, names_left_out, stamped};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
 use crate::recording::{Channel, TimeAxis};
 use crate::unit::NamedUnit;
-use crate::warning::Warning;
 
 pub(super) const UNIVERSAL: Format = Format {
     name: "uff",
@@ -81,12 +80,7 @@ fn read(bytes: &mut Bytes, _: &Reading) -> Result<Content, Failure> {
             while lines.next()?.is_some_and(|line| line.trim() != "-1") {}
         }
     }
-    if !left_out.is_empty() {
-        content.warnings.push(Warning::new(
-            "left-out",
-            format!("left out: {}", left_out.join(", ")),
-        ));
-    }
+    content.warnings.extend(names_left_out(&left_out));
     tell_apart(&mut content.channels, &labels);
     kinds.dedup();
     content.dialect = format!("universal file, data sets {}", kinds.join(" and "));
