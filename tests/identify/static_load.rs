@@ -615,3 +615,28 @@ fn noise_of_a_measured_load_does_not_bias_the_sensitivity() {
         coverage.at_least(92, &format!("noise of {cell} N m"));
     }
 }
+
+/// Loads entered up to 4 s late, of 10 s: the readings of most rows are right, and had been refused from 17 % on.
+#[test]
+fn loads_entered_late_are_left_out() {
+    let units = units();
+    let loads = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0];
+    for late in [75, 100, 150, 200] {
+        let mut noise = Noise(late as u64);
+        let row = |i: usize| {
+            let entered = loads[i.saturating_sub(late) / 500];
+            point(
+                entered,
+                0.013 + 0.08 * loads[i / 500] + 3e-4 * noise.normal(),
+                0,
+            )
+        };
+        let points: Vec<Point> = (0..5500).map(row).collect();
+        let found = identify(&points, 1, &units).unwrap();
+        let slope = of(&found, "sensitivity");
+        let off = (slope.value() - 0.08).abs() / slope.std().unwrap();
+        let codes: Vec<&str> = found.warnings.iter().map(|w| w.code).collect();
+        assert!(codes.contains(&"unsettled-left-out"), "{late}: {codes:?}");
+        assert!(off < 4.0, "{late}: {} ± {:?}", slope.value(), slope.std());
+    }
+}

@@ -11,18 +11,20 @@ use crate::identify::Identification;
 use crate::print::{plural, rounded};
 
 /// Parts of the rows at each load that are tried, the longest first: from and to.
-const PARTS: [[f64; 2]; 9] = [
+const PARTS: [[f64; 2]; 11] = [
     [0.0, 1.0],
     [1.0 / 6.0, 1.0],
     [0.0, 5.0 / 6.0],
     [1.0 / 6.0, 5.0 / 6.0],
     [1.0 / 3.0, 1.0],
+    [0.0, 2.0 / 3.0],
     [1.0 / 3.0, 5.0 / 6.0],
     [1.0 / 2.0, 1.0],
+    [0.0, 1.0 / 2.0],
     [1.0 / 2.0, 5.0 / 6.0],
     [2.0 / 3.0, 1.0],
 ];
-/// Largest part left out at either end for which a load entered late or early is as likely as a slow settling.
+/// Largest part left out at the beginning for which a load entered early is as likely as a slow settling.
 const SHORT: f64 = 0.2;
 /// Minimum number of rows at a load, and of loads.
 const ROWS: usize = 3 * RUN;
@@ -76,9 +78,10 @@ impl SteadyReadings {
         })
     }
 
-    /// Whether only a few rows next to the changes of the load are left out, and the others are independent readings.
+    /// Whether few or none of the first rows at a load are left out, which rules out a slow settling, and those used are
+    /// independent readings.
     pub fn is_at_once(&self) -> bool {
-        self.is_white && self.part[0] < SHORT && self.part[1] > 1.0 - SHORT
+        self.is_white && self.part[0] < SHORT
     }
 
     /// Describes how the rows are used.
