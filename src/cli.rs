@@ -31,7 +31,7 @@ pub use messages::{Messages, ProgressMode};
 pub use pages::{Completions, Man, Schema};
 pub use simulate::Simulate;
 pub use values::{BandOption, Orders};
-use values::{band, digits, orders, percent, range, result_file, svg_file, warning_code};
+use values::{band, digits, orders, percent, result_file, svg_file, time_range, warning_code};
 pub(crate) use wrong::{is_json_asked, log_asked, wrong_usage};
 
 /// Version, commit and target of this build.
@@ -302,7 +302,7 @@ pub struct Compensate {
         help_heading = "Report")]
     pub plot: Option<PathBuf>,
     /// Time range to plot, in seconds
-    #[arg(long, value_name = "FROM..TO", value_parser = range, requires = "plot", hide_short_help = true,
+    #[arg(long, value_name = "FROM..TO", value_parser = time_range, requires = "plot", hide_short_help = true,
         help_heading = "Report")]
     pub plot_range: Option<(f64, f64)>,
     /// Write an HTML report with charts, band, noise and uncertainty

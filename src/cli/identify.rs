@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::{OutputArgs, Strictness, Units, range};
+use super::values::{frequency_range, segment};
+use super::{OutputArgs, Strictness, Units};
 use crate::identify::Motion;
 use crate::identify::response::Excitation;
 use crate::io::{ChannelChoice, Reading};
@@ -101,7 +102,7 @@ pub struct Decay {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=20), help_heading = "Method")]
     pub modes: Option<u8>,
     /// Frequencies of the modes, in Hz
-    #[arg(long, value_name = "FROM..TO", value_parser = range, help_heading = "Band")]
+    #[arg(long, value_name = "FROM..TO", value_parser = frequency_range, allow_hyphen_values = true, help_heading = "Band")]
     pub band: Option<(f64, f64)>,
     /// Known constants.
     #[command(flatten)]
@@ -153,7 +154,7 @@ pub struct Response {
     #[arg(long, value_enum, help_heading = "Stand")]
     pub excitation: Option<Excitation>,
     /// Frequencies to fit, in Hz [default: where the excitation has power]
-    #[arg(long, value_name = "FROM..TO", value_parser = range, help_heading = "Band")]
+    #[arg(long, value_name = "FROM..TO", value_parser = frequency_range, allow_hyphen_values = true, help_heading = "Band")]
     pub band: Option<(f64, f64)>,
     /// Number of modes [default: chosen by the error on held-out data]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=40), help_heading = "Method")]
@@ -170,6 +171,7 @@ pub struct Response {
     #[arg(
         long,
         value_name = "N",
+        value_parser = segment,
         hide_short_help = true,
         help_heading = "Method"
     )]
@@ -221,7 +223,12 @@ pub struct Runup {
     #[arg(long, help_heading = "Method")]
     pub by_direction: bool,
     /// Half-width of the averaging window, in seconds [default: chosen from the data]
-    #[arg(long, value_name = "S", help_heading = "Method")]
+    #[arg(
+        long,
+        value_name = "S",
+        allow_hyphen_values = true,
+        help_heading = "Method"
+    )]
     pub window: Option<f64>,
     /// How the file is read.
     #[command(flatten)]

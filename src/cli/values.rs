@@ -50,13 +50,34 @@ pub fn digits(text: &str) -> Result<Digits, String> {
     }
 }
 
-pub fn range(text: &str) -> Result<(f64, f64), String> {
-    let ends = text
-        .split_once("..")
-        .and_then(|(from, to)| Some((from.trim().parse().ok()?, to.trim().parse().ok()?)));
-    match ends {
-        Some((from, to)) if from < to => Ok((from, to)),
-        _ => Err("expected two times in seconds, such as 0.1..0.15".to_owned()),
+/// Two numbers in ascending order.
+fn ends(text: &str) -> Option<(f64, f64)> {
+    let (from, to) = text.split_once("..")?;
+    let (from, to) = (from.trim().parse().ok()?, to.trim().parse().ok()?);
+    (from < to).then_some((from, to))
+}
+
+pub fn time_range(text: &str) -> Result<(f64, f64), String> {
+    ends(text).ok_or_else(|| "expected two times in seconds, such as 0.1..0.15".to_owned())
+}
+
+pub fn frequency_range(text: &str) -> Result<(f64, f64), String> {
+    ends(text)
+        .filter(|(from, to)| *from >= 0.0 && to.is_finite())
+        .ok_or_else(|| {
+            "expected two frequencies in Hz, the lower first, such as 20..400".to_owned()
+        })
+}
+
+/// Minimum number of samples in a segment: fewer resolve no mode.
+const LEAST_SEGMENT: usize = 16;
+
+pub fn segment(text: &str) -> Result<usize, String> {
+    match text.trim().parse() {
+        Ok(samples) if samples >= LEAST_SEGMENT => Ok(samples),
+        _ => Err(format!(
+            "expected a number of samples, {LEAST_SEGMENT} or more"
+        )),
     }
 }
 
@@ -154,8 +175,17 @@ mod tests {
     fn values_are_read_as_people_write_them() {
         assert_eq!(orders("1-3,0.5,2").unwrap().0, [0.5, 1.0, 2.0, 3.0]);
         assert!(orders("3-1").is_err() && orders("0").is_err() && orders("a").is_err());
-        assert_eq!(range("0.1..0.2"), Ok((0.1, 0.2)));
-        assert!(range("0.2..0.1").is_err());
+        assert_eq!(time_range("0.1..0.2"), Ok((0.1, 0.2)));
+        assert!(time_range("0.2..0.1").is_err());
+        assert_eq!(frequency_range("0..20"), Ok((0.0, 20.0)));
+        for wrong in ["20..5", "-1..5", "5..inf", "nan..5"] {
+            assert!(
+                frequency_range(wrong).unwrap_err().contains("Hz"),
+                "{wrong}"
+            );
+        }
+        assert_eq!(segment("16"), Ok(16));
+        assert!(segment("15").is_err());
         assert_eq!(digits("9"), Ok(Digits::Significant(9)));
         assert_eq!(svg_file("a/x.svg".into()), Ok(PathBuf::from("a/x.svg")));
         assert!(

@@ -255,6 +255,19 @@ fn responses_of_nonsense_are_refused() {
         .says(1, &["still.csv", "measured channel does not change"]);
     run(&["silent.csv"], "force", "beam").says(1, &["applied channel does not change"]);
     run(&["same.csv"], "force", "beam").says(1, &["same numbers"]);
+    for (flag, value, says) in [
+        ("--band", "5..2", "two frequencies in Hz"),
+        ("--band", "-5..100", "two frequencies in Hz"),
+        ("--band", "5..inf", "two frequencies in Hz"),
+        ("--segment", "0", "16 or more"),
+        ("--segment", "3", "16 or more"),
+        ("--radius", "-0.1 m", "greater than 0"),
+    ] {
+        let args = "identify response good.csv --applied force --measured beam";
+        let given = format!("{flag}={value}");
+        let args: Vec<&str> = args.split(' ').chain([given.as_str()]).collect();
+        folder.run(&args).says(2, &[flag, says]);
+    }
     // Another rate.
     let slow = folder.read("good.csv").replace("0.001,", "0.0013,");
     folder.write("odd.csv", slow);
@@ -361,6 +374,11 @@ fn loads_and_runs_of_nonsense_are_refused() {
     let rough = "0,0\n5,0.4\n10,1.1\n5,0.6\n0,0.1\n5,0.45\n10,0.9\n5,0.5\n0,0\n";
     folder.write("rough.csv", format!("{head}{rough}"));
     loads("rough.csv", "weight", "bridge").says(0, &["poor-fit"]);
+    let args = "identify static rough.csv --load weight --load-unit N --reading bridge";
+    let args: Vec<&str> = args.split(' ').chain(["--radius=-0.1 m"]).collect();
+    folder
+        .run(&args)
+        .says(2, &["--radius -0.1 m", "greater than 0"]);
     // An angle with the wrong sign.
     let torque: Vec<f64> = (0..4000)
         .map(|i| (TAU * 0.7e-3 * f64::from(i)).sin())
@@ -379,4 +397,36 @@ fn loads_and_runs_of_nonsense_are_refused() {
     folder
         .run(&[&args[..], &["-o", "new.toml"]].concat())
         .says(1, &["inertia is negative (-", "check the sign"]);
+    // The first would have taken all memory, or panicked; the others were 4 samples.
+    for window in ["1e9", "inf", "nan", "0", "-1", "0.001"] {
+        let given = format!("--window={window}");
+        folder
+            .run(&[&args[..], &[given.as_str()]].concat())
+            .says(2, &["--window", "from 0.004 s, 4 samples, to 1.999 s"]);
+    }
+    let with_radius = |more: &[&str]| folder.run(&[&args[..], more].concat());
+    with_radius(&["--radius", "0.1 m"]).says(
+        2,
+        &[
+            "--radius goes with a force on a rotating body",
+            "is a torque",
+        ],
+    );
+    with_radius(&["--radius=-0.1 m", "--torque-unit", "N"])
+        .says(2, &["--radius -0.1 m", "greater than 0"]);
+    with_radius(&[
+        "--radius",
+        "0.1 m",
+        "--torque-unit",
+        "N",
+        "--motion-unit",
+        "m",
+    ])
+    .says(
+        2,
+        &[
+            "--radius goes with a force on a rotating body",
+            "is a force",
+        ],
+    );
 }

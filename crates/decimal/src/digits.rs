@@ -250,7 +250,10 @@ fn put_scientific(
 #[cold]
 fn rare(value: f64, count: u32) -> String {
     let text = format!("{value:.*e}", count as usize - 1);
-    let (digits, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    // Infinity and NaN have no exponent.
+    let Some((digits, exponent)) = text.split_once('e') else {
+        return text;
+    };
     let digits = if digits.contains('.') {
         digits.trim_end_matches('0').trim_end_matches('.')
     } else {
@@ -264,6 +267,7 @@ fn rare(value: f64, count: u32) -> String {
 /// ```
 /// use torqcomp_decimal::digits::text;
 /// assert_eq!((text(2.0 / 3.0, 4), text(1.5e-7, 12)), ("0.6667".to_owned(), "1.5e-7".to_owned()));
+/// assert_eq!((text(1e300, 4), text(f64::INFINITY, 4)), ("1e300".to_owned(), "inf".to_owned()));
 /// ```
 #[must_use]
 pub fn text(value: f64, significant: u32) -> String {

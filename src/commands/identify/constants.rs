@@ -2,7 +2,7 @@
 
 use torqcomp_model::{Estimate, Kind};
 
-use super::{declared, entry, quantity, stand_text};
+use super::{declared, entry, positive, stand_text};
 use crate::cli::identify::{Anchors, Findings};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::{Identification, KnownConstant, ModalPole, NamedEstimate};
@@ -121,18 +121,6 @@ fn known(
         Ratios::OverStiffness => stiffness.or(inertia),
     };
     Ok(first.map(|known| (known, false)))
-}
-
-fn positive(flag: &str, text: &str, kind: Kind) -> Result<f64, Failure> {
-    let value = quantity(flag, text, kind)?;
-    if value > 0.0 {
-        Ok(value)
-    } else {
-        Err(Failure::usage(
-            ErrorCode::InvalidValue,
-            format_args!("{flag} {text}: it must be greater than 0"),
-        ))
-    }
 }
 
 /// Adds inertia, damping and stiffness from the residue for torque in, motion out; returns the stand-file entries.

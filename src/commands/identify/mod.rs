@@ -206,6 +206,25 @@ fn unit_or(channel: RecordedChannel, flag: &str) -> Result<NamedUnit, Failure> {
     })
 }
 
+/// Reads a quantity from the command line that must be greater than 0.
+fn positive(flag: &str, text: &str, kind: Kind) -> Result<f64, Failure> {
+    let value = quantity(flag, text, kind)?;
+    if value > 0.0 {
+        Ok(value)
+    } else {
+        Err(Failure::usage(
+            ErrorCode::InvalidValue,
+            format_args!("{flag} {text}: it must be greater than 0"),
+        ))
+    }
+}
+
+/// The radius at which a force acts, in m, if given.
+fn radius(text: Option<&str>) -> Result<Option<f64>, Failure> {
+    text.map(|text| positive("--radius", text, Kind::Length))
+        .transpose()
+}
+
 /// Reads a quantity from the command line.
 fn quantity(flag: &str, text: &str, kind: Kind) -> Result<f64, Failure> {
     kind.parse(text).map_err(|error| {

@@ -1,10 +1,10 @@
 //! `identify response`.
 
-use torqcomp_model::{Estimate, Kind};
+use torqcomp_model::Estimate;
 
 use super::constants::{Ratios, from_ratios, from_residue};
 use super::modes;
-use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, stand_text, unit_or};
+use super::{FORCE, Recorded, TORQUE, deliver, entry, radius, stand_text, unit_or};
 use crate::cli::identify::Response;
 use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
@@ -71,6 +71,7 @@ fn load(args: &Response, recorded: &mut Recorded) -> Result<Vec<AlignedChannels>
         [&args.applied, &args.measured],
         [args.applied_unit.as_deref(), args.measured_unit.as_deref()],
     );
+    let radius_m = radius(args.radius.as_deref())?;
     let mut loaded: Vec<AlignedChannels> = Vec::new();
     for input in &args.inputs {
         let mut read = AlignedChannels::read(&Input::of(input), &choices, &args.reading)?;
@@ -84,8 +85,8 @@ fn load(args: &Response, recorded: &mut Recorded) -> Result<Vec<AlignedChannels>
         recorded.warn(quality::clipped(&read), false);
         recorded.warn(quality::repeated(&read), false);
         recorded.warn(quality::coarse_of(&read.channels), false);
-        if let Some(radius) = &args.radius {
-            to_torque(&mut read.channels[0], radius)?;
+        if let Some(radius_m) = radius_m {
+            to_torque(&mut read.channels[0], radius_m)?;
         }
         if let Some(first) = loaded.first() {
             read.convert_to_units_of(first)?;
@@ -131,14 +132,7 @@ const NOT_AT_REST: &str = "the static response of these modes is zero, but a sta
     another --band";
 
 /// Converts a force at a radius to a torque.
-fn to_torque(force: &mut Channel, radius: &str) -> Result<(), Failure> {
-    let radius_m = quantity("--radius", radius, Kind::Length)?;
-    if radius_m <= 0.0 {
-        return Err(Failure::usage(
-            ErrorCode::InvalidValue,
-            format_args!("--radius {radius}: it must be greater than 0"),
-        ));
-    }
+fn to_torque(force: &mut Channel, radius_m: f64) -> Result<(), Failure> {
     let unit = unit_or(force.recorded(), "--applied-unit")?;
     if unit.unit.dimension() != FORCE {
         return Err(Failure::usage(

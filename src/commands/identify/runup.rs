@@ -1,8 +1,8 @@
 //! `identify runup`.
 
-use torqcomp_model::{Dimension, Kind, Unit};
+use torqcomp_model::{Dimension, Unit};
 
-use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, unit_or};
+use super::{FORCE, Recorded, TORQUE, deliver, entry, radius, unit_or};
 use crate::cli::identify::Runup;
 use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
@@ -107,16 +107,27 @@ fn effort_factor(args: &Runup, torque: &Channel, turning: bool) -> Result<f64, F
             (unit.unit.factor(), unit.unit.dimension())
         }
     };
-    let radius = match &args.radius {
-        Some(text) => Some(quantity("--radius", text, Kind::Length)?),
-        None => None,
-    };
+    let radius = radius(args.radius.as_deref())?;
     match (turning, dimension, radius) {
         (true, TORQUE, None) | (false, FORCE, None) => Ok(factor),
         (true, FORCE, Some(radius)) => Ok(factor * radius),
         (true, FORCE, None) => Err(Failure::failed(
             ErrorCode::MissingArgument,
             "a force on a rotating body needs a radius; give it with --radius",
+        )),
+        (true, TORQUE, Some(_)) | (false, FORCE, Some(_)) => Err(Failure::usage(
+            ErrorCode::ConflictingArguments,
+            format_args!(
+                "--radius goes with a force on a rotating body; \"{}\" is a {} and \"{}\" {}: omit it",
+                torque.name,
+                if turning { "torque" } else { "force" },
+                args.motion,
+                if turning {
+                    "an angle or its derivative"
+                } else {
+                    "a linear motion"
+                }
+            ),
         )),
         (false, TORQUE, _) => Err(Failure::failed(
             ErrorCode::UnitUnsuitable,

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use torqcomp_decimal::digits;
 use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit};
 
-use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, unit_or};
+use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, radius, unit_or};
 use crate::cli::identify::Static;
 use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
@@ -263,12 +263,10 @@ fn on_earth(gravity: Option<f64>, text: Option<&str>) -> Result<(), Failure> {
 /// SI units per unit of the load, and their name.
 fn load_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
     let factor = unit.unit.factor();
-    let of = |flag: &str, text: &Option<String>, kind| -> Result<Option<f64>, Failure> {
-        let text = text.as_deref();
-        text.map(|text| quantity(flag, text, kind)).transpose()
-    };
-    let radius = of("--radius", &args.radius, Kind::Length)?;
-    let gravity = of("--gravity", &args.gravity, Kind::Acceleration)?;
+    let radius = radius(args.radius.as_deref())?;
+    let gravity = args.gravity.as_deref();
+    let gravity = gravity.map(|text| quantity("--gravity", text, Kind::Acceleration));
+    let gravity = gravity.transpose()?;
     on_earth(gravity, args.gravity.as_deref())?;
     let is_mass = unit.unit.dimension() == MASS;
     if unit.unit.has_bare_weight()

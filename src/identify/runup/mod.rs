@@ -21,7 +21,8 @@ mod windows;
 mod wrapped;
 
 use super::{FitQuality, Identification, Motion, NamedEstimates, rms};
-use crate::failure::Failure;
+use crate::failure::{ErrorCode, Failure};
+use crate::print::short;
 use directions::Directions;
 use windows::{WindowRows, plateau};
 
@@ -90,6 +91,26 @@ const LEAST_WINDOWS: usize = 12;
 /// Half of the shortest window tried, in samples.
 const SHORTEST_HALF: usize = 8;
 
+/// Half of the shortest window that can be given, in samples.
+const LEAST_HALF: usize = 4;
+
+/// Half of a given window, in samples.
+fn given_half(seconds: f64, run: &FreeRun) -> Result<usize, Failure> {
+    let most = (run.motion.len() - 1) / 2;
+    let half = (seconds * run.rate_hz).round();
+    match (LEAST_HALF as f64..=most as f64).contains(&half) {
+        true => Ok(half as usize),
+        false => Err(Failure::usage(
+            ErrorCode::InvalidValue,
+            format_args!(
+                "--window {seconds}: expected a half-width from {} s, {LEAST_HALF} samples, to {} s, half of the record",
+                short(LEAST_HALF as f64 / run.rate_hz),
+                short(most as f64 / run.rate_hz)
+            ),
+        )),
+    }
+}
+
 /// Evaluates a run.
 ///
 /// # Errors
@@ -105,7 +126,7 @@ pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification,
     let directions = Directions::of(run)?;
     let split = options.by_direction && directions.both();
     let half = match options.half_window_s {
-        Some(seconds) => ((seconds * run.rate_hz).round() as usize).max(4),
+        Some(seconds) => given_half(seconds, run)?,
         None => plateau(run, &directions),
     };
     let fitted = WindowRows::of(run, &directions, half, split)?.fit()?;
