@@ -346,15 +346,17 @@ fn known_loads_calibrate_every_kind_of_reading() {
         ("mV/V", 1.0, 0.02, "torque_per_ratio"),
         ("uV/V", 1000.0, 20.0, "torque_per_ratio"),
         ("V", 2.0, 0.1, "torque_per_volt"),
-        ("mA", 4.0, 12.0, "rated_torque"),
-        ("kHz", 15.0, 60.0, "rated_torque"),
+        ("mA", 4.0, 12.0, "at_torque = { value = \"50 N m\""),
+        ("kHz", 15.0, 60.0, "at_torque = { value = \"50 N m\""),
     ];
     for (unit, swing, zero, key) in forms {
         let folder = Folder::new();
-        folder.write("new.toml", MECHANICS);
+        let rated = "rated_torque = \"200 N m\"";
+        let sheet = format!("{MECHANICS}[calibration]\nsensitivity = \"1 V\"\n{rated}\n");
+        folder.write("new.toml", sheet);
         let mut rows = format!("load [N m],reading [{unit}]\n");
         for load in [
-            0.0, 10.0, 25.0, 40.0, 50.0, 25.0, 0.0, -10.0, -25.0, -50.0, -25.0, 0.0,
+            0.0, -10.0, -25.0, -50.0, -25.0, 0.0, 10.0, 25.0, 40.0, 50.0, 25.0, 0.0,
         ] {
             rows += &format!("{load},{}\n", zero + swing * load / 25.0);
         }
@@ -377,6 +379,8 @@ fn known_loads_calibrate_every_kind_of_reading() {
             let written = folder.read("new.toml");
             let expected = if degree == "1" { key } else { "points" };
             assert!(written.contains(expected), "{unit}: {written}");
+            // It had become the largest load, or was lost.
+            assert!(written.contains(rated), "{unit}: {written}");
             folder.write("stand.toml", written);
             folder.write(
                 "in.csv",

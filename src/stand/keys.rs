@@ -118,6 +118,7 @@ pub(crate) const SECTIONS: &[StandSection] = &[
         ("sensitivity", RecordQuantity, "change of the output from no load to `rated_torque`, with its sign: `\"2.0012 mV/V\"`, `\"10 V\"`, `\"8 mA\"` or `\"30 kHz\"`"),
         ("rated_torque", Quantity(Kind::Torque), "torque of `sensitivity` or `frequency_at_rated`; with another form \
             the transducer's rated torque. A result beyond 1.5 times it causes a warning"),
+        ("at_torque", Quantity(Kind::Torque), "torque of `sensitivity` or `frequency_at_rated` if it is not the rated one, as from known loads"),
         ("zero_frequency", Quantity(Kind::Frequency), "output at no load of a transducer with frequency output"),
         ("frequency_at_rated", Quantity(Kind::Frequency), "its output at `rated_torque`"),
         ("lever_arm", Quantity(Kind::Length), "distance from the shaft at which a recorded force acts"),

@@ -131,7 +131,7 @@ fn finish(section: &Section) -> Result<(), Failure> {
     if section.finish().is_ok() {
         return Ok(());
     }
-    let beside = ["rated_torque", "zero_frequency", "degree"];
+    let beside = ["rated_torque", AT_TORQUE, "zero_frequency", "degree"];
     let taken: Vec<&str> = FORMS
         .into_iter()
         .chain(beside)
@@ -208,7 +208,10 @@ fn frequency(section: &Section) -> Result<MeasuredCalibration, Failure> {
     )
 }
 
-/// The constant that follows from the change of the signal at the rated torque.
+/// Key of a torque of `sensitivity` other than the rated one, as from known loads.
+pub const AT_TORQUE: &str = "at_torque";
+
+/// The constant that follows from the change of the signal at the rated torque, or at another one.
 fn per_change(
     section: &Section,
     signal: TransducerSignal,
@@ -216,8 +219,14 @@ fn per_change(
     key: &'static str,
     zero: Option<Estimate>,
 ) -> Result<MeasuredCalibration, Failure> {
-    let rated = section.required("rated_torque", Kind::Torque)?;
-    for (key, value) in [(key, change.value()), ("rated_torque", rated.value())] {
+    let (of, torque) = match section.quantity(AT_TORQUE, Kind::Torque)? {
+        Some(torque) => (AT_TORQUE, torque),
+        None => (
+            "rated_torque",
+            section.required("rated_torque", Kind::Torque)?,
+        ),
+    };
+    for (key, value) in [(key, change.value()), (of, torque.value())] {
         if value == 0.0 {
             return Err(section.fail(
                 key,
@@ -225,8 +234,8 @@ fn per_change(
             ));
         }
     }
-    let relative_std = together(&[rated.relative_std(), change.relative_std()]);
-    let value = rated.value() / change.value();
+    let relative_std = together(&[torque.relative_std(), change.relative_std()]);
+    let value = torque.value() / change.value();
     let unit = Kind::TorquePerVolt;
     let law = match signal {
         TransducerSignal::Voltage => {
@@ -239,7 +248,7 @@ fn per_change(
         law: CalibrationLaw::Constant(law.with_source("stand file")),
         zero,
         relative_std,
-        rated_n_m: Some(rated.value().abs()),
+        rated_n_m: optional_rated(section)?,
     })
 }
 

@@ -33,7 +33,7 @@ use crate::warning::Warning;
 pub use calibration::{Applied, Calibration, RecordedLevels, applied_by_unit};
 pub use effects::{DeclaredEffect, derivative};
 pub use file::{parse, read, text};
-pub use measured::{CalibrationLaw, MeasuredCalibration};
+pub use measured::{AT_TORQUE, CalibrationLaw, MeasuredCalibration};
 pub use modes::{DeclaredMode, MODE_CORRELATIONS};
 pub use rated::off_rated;
 pub use refine::{Refined, refine, si_unit};

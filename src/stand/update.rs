@@ -196,7 +196,9 @@ fn make_room(name: &str, document: &mut DocumentMut, entries: &[Entry]) -> Resul
         .and_then(Item::as_table_like_mut)
     {
         let keys: Vec<String> = table.iter().map(|(key, _)| key.to_owned()).collect();
-        for key in keys.iter().filter(|key| !is_new(key)) {
+        // The rated torque is a property of the transducer, not of its calibration.
+        let is_replaced = |key: &&String| !is_new(key) && *key != "rated_torque";
+        for key in keys.iter().filter(is_replaced) {
             table.remove(key);
         }
     }

@@ -14,8 +14,8 @@ use crate::identify::Identification;
 use crate::identify::static_load::{CalibrationStep, LoadUnits, Point, identify, series_of};
 use crate::io::{ChannelChoice, Flags, Input, Reading};
 use crate::recording::{Recording, unit_of};
-use crate::stand::TransducerSignal;
 use crate::stand::update::Entry;
+use crate::stand::{AT_TORQUE, TransducerSignal};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
@@ -386,21 +386,21 @@ fn entries(args: &Static, result: &Identification, units: &LoadUnits) -> Vec<Ent
     entries
 }
 
-/// `sensitivity` and `rated_torque`: the change of the reading at the largest load.
+/// `sensitivity` and `at_torque`: the change of the reading at the largest load.
 fn at_largest_load(result: &Identification, units: &LoadUnits, source: &str) -> Vec<Entry> {
     let Some(slope) = result.get("sensitivity") else {
         return Vec::new();
     };
-    let farther = |m: f64, l: f64| if l.abs() > m.abs() { l } else { m };
-    let largest = result.steps.iter().map(|s| s.load).fold(0.0, farther);
+    let loads = result.steps.iter().map(|s| s.load.abs());
+    let largest = loads.fold(0.0, f64::max);
     let change = Estimate::of(
         units.reading.clone(),
         slope.value() * largest,
-        slope.std().map(|std| std * largest.abs()),
+        slope.std().map(|std| std * largest),
     );
-    let rated = Estimate::of(Kind::Torque, largest, None);
+    let at = Estimate::of(Kind::Torque, largest, None);
     vec![
         Entry::quantity("calibration", "sensitivity", &change, source),
-        Entry::quantity("calibration", "rated_torque", &rated, source),
+        Entry::quantity("calibration", AT_TORQUE, &at, source),
     ]
 }
