@@ -107,6 +107,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["leakage", "the segments are too short for a narrow mode, whose damping is overestimated", "choose a longer --segment"],
         ["few-samples-per-swing", "the body reverses within few samples, so that dry and viscous friction cannot be told apart", "record at a higher rate, or reverse less often"],
         ["level-dependent", "the response differs between levels", "look for the cause with diagnose"],
+        ["low-pass-fitted", "the measured channel lags as behind an RC low-pass, which was fitted", "check the filter of the amplifier, or record both channels with the same filters"],
         ["mains-taken-off", "steady mains lines were fitted along with the decay and removed", "record for longer if one of them is the stand's own"],
         ["not-linear", "the readings deviate from the curve by more than their repeatability explains: the characteristic is nonlinear, or the amplifier is at its limit", "omit the loads beyond the limit, or use --degree 3"],
         ["no-unloading", "no readings were taken during unloading, so the hysteresis is unknown", "unload in steps as well"],

@@ -176,7 +176,7 @@ pub struct Response {
         help_heading = "Method"
     )]
     pub segment: Option<usize>,
-    /// Also fit a delay of the measured channel
+    /// Also fit a delay of the measured channel, or an RC low-pass if that explains more
     #[arg(long, hide_short_help = true, help_heading = "Method")]
     pub delay: bool,
     /// Known constants.

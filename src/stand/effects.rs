@@ -173,7 +173,7 @@ impl Stand {
     /// # Errors
     /// If the stand file gives no mechanics.
     pub fn chain(&self) -> Result<Chain, Failure> {
-        let recorder = self.recorder.recorder.clone();
+        let recorder = self.recorder.recorder;
         let is_ideal = recorder.is_ideal();
         let response: Fixed = Arc::new(move |frequency_hz| recorder.response(frequency_hz));
         let modes = self.modes()?;

@@ -11,7 +11,7 @@ use super::measured::{MeasuredCalibration, calibration};
 use super::measuring::{bridge, gage, recorder, unusual_gage_factor};
 use super::mechanics::mechanics;
 use super::section::{Section, SourceText};
-use super::{Diagnosed, Mechanics, Stand, TransducerSignal};
+use super::{Diagnosed, Mechanics, RecorderData, Stand, TransducerSignal};
 use crate::failure::Failure;
 use crate::file_name::ShowPath;
 use crate::io::storage;
@@ -90,6 +90,38 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
         .map(|section| effect(section, stand.recorded_unit()))
         .collect::<Result<_, _>>()?;
     Ok(stand)
+}
+
+/// A section of a possibly incomplete stand file.
+fn section_of<T>(
+    (name, text): (&str, &str),
+    key: &'static str,
+    read: impl Fn(&Section) -> Result<T, Failure>,
+) -> Result<Option<T>, Failure> {
+    let source = SourceText { name, text };
+    let document = Document::parse(text)
+        .map_err(|error| source.at(error.span().map(|span| span.start), error.message()))?;
+    one(
+        &Section::new(&source, "", document.as_table(), Some(0)),
+        key,
+        read,
+    )
+}
+
+/// The recorder of a possibly incomplete stand file.
+///
+/// # Errors
+/// If its section contains an invalid key or value.
+pub fn recorder_of(name: &str, text: &str) -> Result<Option<RecorderData>, Failure> {
+    section_of((name, text), "recorder", recorder)
+}
+
+/// The calibration of a possibly incomplete stand file.
+///
+/// # Errors
+/// As for [`recorder_of`].
+pub fn calibration_of(name: &str, text: &str) -> Result<Option<MeasuredCalibration>, Failure> {
+    section_of((name, text), "calibration", calibration)
 }
 
 /// An optional section.

@@ -15,6 +15,17 @@ pub(super) fn driven(
     (top_hz, ratio): (f64, f64),
     noise: &mut Noise,
 ) -> (Vec<f64>, Vec<f64>) {
+    let none = |_: f64| Complex64::ONE;
+    driven_behind(count, (top_hz, ratio), [&none, &none], noise)
+}
+
+/// The same behind filters of the applied and of the measured channel.
+pub(super) fn driven_behind(
+    count: usize,
+    (top_hz, ratio): (f64, f64),
+    [of_applied, of_measured]: [&dyn Fn(f64) -> Complex64; 2],
+    noise: &mut Noise,
+) -> (Vec<f64>, Vec<f64>) {
     let length = (count * 3 / 2).next_power_of_two();
     let step = RATE_HZ / length as f64;
     let plan = torqcomp_fourier::inverse(length);
@@ -28,12 +39,12 @@ pub(super) fn driven(
         out.truncate(count);
         out
     };
-    let answer = spectrum
-        .iter()
-        .enumerate()
-        .map(|(k, x)| x * response_at(TAU * step * k as f64, NATURAL, ratio))
-        .collect();
-    (signal(spectrum), signal(answer))
+    let all = || spectrum.iter().enumerate();
+    let hertz = |k: usize| step * k as f64;
+    let applied = all().map(|(k, x)| x * of_applied(hertz(k)));
+    let answer = |k: usize| response_at(TAU * hertz(k), NATURAL, ratio) * of_measured(hertz(k));
+    let shown = all().map(|(k, x)| x * answer(k));
+    (signal(applied.collect()), signal(shown.collect()))
 }
 
 #[test]

@@ -1,11 +1,13 @@
 //! The recorder between bridge and file: gain, low-pass, delay.
 
+use std::f64::consts::TAU;
+
 use num_complex::Complex64;
 
 use crate::Error;
 
 /// Response of a recorder to its input.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Recorder {
     gain: f64,
     low_pass: Option<LowPass>,
@@ -54,6 +56,18 @@ impl Recorder {
         })
     }
 
+    /// Delay in s.
+    #[must_use]
+    pub fn delay_s(&self) -> f64 {
+        self.delay_s
+    }
+
+    /// Whether it has a low-pass.
+    #[must_use]
+    pub fn has_low_pass(&self) -> bool {
+        self.low_pass.is_some()
+    }
+
     /// Static gain, output per input.
     #[must_use]
     pub fn gain(&self) -> f64 {
@@ -80,11 +94,16 @@ impl Recorder {
     /// ```
     #[must_use]
     pub fn response(&self, frequency_hz: f64) -> Complex64 {
-        let turn = -std::f64::consts::TAU * frequency_hz * self.delay_s;
-        let low_pass = self
-            .low_pass
-            .map_or(Complex64::ONE, |filter| filter.response(frequency_hz));
-        low_pass * Complex64::from_polar(1.0, turn)
+        self.transfer(Complex64::new(0.0, TAU * frequency_hz))
+    }
+
+    /// The same for any s in 1/s, such as on the line that an exponential window moves the response to.
+    #[must_use]
+    pub fn transfer(&self, s: Complex64) -> Complex64 {
+        let low_pass = self.low_pass.map_or(Complex64::ONE, |filter| {
+            filter.factors(s / (TAU * filter.cutoff_hz)).product()
+        });
+        low_pass * (-s * self.delay_s).exp()
     }
 
     /// Unwrapped phase of [`Recorder::response`] in rad, 0 at DC.
@@ -99,9 +118,12 @@ impl Recorder {
     #[must_use]
     pub fn phase_rad(&self, frequency_hz: f64) -> f64 {
         let low_pass = self.low_pass.map_or(0.0, |filter| {
-            filter.factors(frequency_hz).map(|h| h.arg()).sum()
+            filter
+                .factors(filter.at(frequency_hz))
+                .map(|h| h.arg())
+                .sum()
         });
-        low_pass - std::f64::consts::TAU * frequency_hz * self.delay_s
+        low_pass - TAU * frequency_hz * self.delay_s
     }
 }
 
@@ -117,12 +139,16 @@ impl LowPass {
     /// ```
     #[must_use]
     pub fn response(&self, frequency_hz: f64) -> Complex64 {
-        self.factors(frequency_hz).product()
+        self.factors(self.at(frequency_hz)).product()
     }
 
-    /// The response of each pole; none crosses the negative real axis.
-    fn factors(&self, frequency_hz: f64) -> impl Iterator<Item = Complex64> {
-        let s = Complex64::new(0.0, frequency_hz / self.cutoff_hz);
+    /// s over the cutoff at a frequency.
+    fn at(&self, frequency_hz: f64) -> Complex64 {
+        Complex64::new(0.0, frequency_hz / self.cutoff_hz)
+    }
+
+    /// The response of each pole, for s over the cutoff; on the imaginary axis none crosses the negative real axis.
+    fn factors(&self, s: Complex64) -> impl Iterator<Item = Complex64> {
         let order = f64::from(self.order);
         (1..=self.order).map(move |k| {
             let angle = std::f64::consts::PI * (2.0 * f64::from(k) + order - 1.0) / (2.0 * order);

@@ -86,7 +86,7 @@ pub(super) fn declared_effects(stand: Option<&Stand>) -> Vec<DeclaredForm> {
 
 /// The recorder as far as declared in the stand file.
 pub(super) fn recorder(stand: &Stand) -> Option<Fixed> {
-    let recorder = stand.recorder.recorder.clone();
+    let recorder = stand.recorder.recorder;
     let is_ideal = recorder.is_ideal();
     let response: Fixed = Arc::new(move |hz| recorder.response(hz));
     (!is_ideal).then_some(response)

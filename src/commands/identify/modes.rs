@@ -2,10 +2,10 @@
 
 use torqcomp_model::Estimate;
 
-use super::{TORQUE, entry, stand_text};
+use super::{TORQUE, stand_text};
 use crate::cli::identify::Findings;
 use crate::failure::Failure;
-use crate::identify::{Identification, MODE_NUMBERS, ModalShares, Motion, NamedEstimates};
+use crate::identify::{MODE_NUMBERS, ModalShares, Motion, NamedEstimates};
 use crate::stand::update::{self, Entry};
 use crate::stand::{MODE_CORRELATIONS, TransducerSignal};
 use crate::unit::NamedUnit;
@@ -30,7 +30,6 @@ impl WrittenModes<'_> {
         &self,
         shares: &ModalShares,
         findings: &Findings,
-        result: &Identification,
     ) -> Result<Vec<Entry>, Failure> {
         let mut all = Vec::new();
         if self.motion != Motion::Displacement {
@@ -45,9 +44,6 @@ impl WrittenModes<'_> {
                 &self.gain(&shares.gain),
                 &self.source,
             ));
-        }
-        if let Some(delay) = result.get("delay").filter(|delay| delay.value() > 0.0) {
-            all.push(entry("recorder", "delay", delay, &self.source));
         }
         let mode = |mode: &NamedEstimates| self.mode(mode);
         all.push(Entry::modes(shares.modes.iter().map(mode).collect()));

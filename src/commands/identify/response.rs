@@ -9,13 +9,13 @@ use crate::cli::identify::Response;
 use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
 use crate::file_name::{self, ShowPath};
-use crate::identify::response::{Driven, RATIO, ResponseOptions, identify};
+use crate::identify::response::{Driven, Lag, RATIO, ResponseOptions, identify};
 use crate::identify::{Identification, Motion, NamedEstimate, gravity_hint};
 use crate::io::{ChannelChoice, Input};
 use crate::quality;
 use crate::recording::{AlignedChannels, Channel};
-use crate::stand::TransducerSignal;
 use crate::stand::update::{self, Entry};
+use crate::stand::{self, TransducerSignal};
 use crate::unit::NamedUnit;
 
 /// Runs the test.
@@ -35,7 +35,8 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         .collect();
     let unit = loaded[0].channels[1].unit.as_ref();
     let motion = motion_of(args, &loaded[0].channels[1].name, unit)?;
-    let mut result = identify(&records, &options(args, motion))?;
+    let stand = stand_text(&args.findings)?;
+    let mut result = identify(&records, &options(args, motion, stand.as_ref())?)?;
     // A clipped resonance looks like noise before it.
     if recorded.warnings.iter().any(|w| w.code == "clipped") {
         result
@@ -53,14 +54,15 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
     }
     let source = format!("identify response: {}", file_name::list(&args.inputs));
     let written = modes::WrittenModes {
-        source,
+        source: source.clone(),
         motion,
         units,
     };
     let mut entries = match result.shares.take() {
-        Some(shares) => written.entries(&shares, &args.findings, &result)?,
+        Some(shares) => written.entries(&shares, &args.findings)?,
         None => entries(args, rad_per_n_m(args, &loaded, motion)?, &mut result)?,
     };
+    entries.extend(recorder(&mut result, &source));
     entries.extend(calibration(args, units, &mut result)?);
     deliver(result, recorded, &args.findings, &entries)
 }
@@ -114,17 +116,47 @@ fn motion_of(args: &Response, name: &str, unit: Option<&NamedUnit>) -> Result<Mo
 }
 
 /// Evaluation of the response.
-fn options(args: &Response, motion: Motion) -> ResponseOptions {
-    ResponseOptions {
+fn options(
+    args: &Response,
+    motion: Motion,
+    stand: Option<&(String, String)>,
+) -> Result<ResponseOptions, Failure> {
+    let declared = stand.map(|(name, text)| stand::recorder_of(name, text));
+    let recorder = declared
+        .transpose()?
+        .flatten()
+        .map(|declared| declared.recorder);
+    Ok(ResponseOptions {
         excitation: args.excitation,
         band_hz: args.band,
         modes: args.modes.map(usize::from),
         period: args.period,
         segment: args.segment,
         order: motion.order(),
-        with_delay: args.delay,
+        lag: args.delay.then_some(Lag::Delay),
+        recorder: recorder.filter(|recorder| !recorder.is_ideal()),
         grounded: args.findings.result.output.is_some(),
+    })
+}
+
+/// Entries of the recorder: the lag of the measured channel.
+fn recorder(result: &mut Identification, source: &str) -> Vec<Entry> {
+    let mut entries = Vec::new();
+    match result.get("delay") {
+        Some(delay) if delay.value() > 0.0 => {
+            entries.push(entry("recorder", "delay", delay, source));
+        }
+        Some(_) => result.method.push(
+            "the delay is not written to a stand file: it is the applied channel that is late"
+                .to_owned(),
+        ),
+        None => {}
     }
+    if let Some(low_pass) = result.get("low_pass") {
+        entries.push(entry("recorder", "low_pass", low_pass, source));
+        entries.push(Entry::whole("recorder", "low_pass_order", 1));
+    }
+    entries
 }
 
 /// Note if no mode has a static gain.

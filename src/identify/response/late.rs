@@ -94,25 +94,72 @@ pub(super) fn better(
     let Ok(mut aligned) = aligned else {
         return as_recorded;
     };
-    let left =
-        |found: &Identification| found.fit.as_ref().map_or(f64::INFINITY, |fit| fit.relative);
-    let is_better = as_recorded.as_ref().map_or(true, |as_recorded| {
-        match aligned.modes.len().cmp(&as_recorded.modes.len()) {
-            Ordering::Less => left(&aligned) <= AS_GOOD * left(as_recorded),
-            Ordering::Equal => AS_GOOD * left(&aligned) <= left(as_recorded),
-            Ordering::Greater => false,
-        }
-    });
-    if !is_better {
+    let count = |found: &Identification| found.modes.len();
+    let is_better = |as_recorded: &Identification| explains_more(&aligned, as_recorded, count);
+    if !as_recorded.as_ref().map_or(true, is_better) {
         return as_recorded;
     }
-    let all = aligned.parameters.iter_mut();
-    let rest = all.filter(|parameter| parameter.name == "delay");
-    let mut delay_s = lag_s;
-    for delay in rest {
+    if aligned.get("delay").is_none() {
+        // The rest is a low-pass.
+        let none = NamedEstimate::new("delay", "s", 0.0, None);
+        aligned.parameters.push(none);
+    }
+    let delay_s = add_delay(&mut aligned, lag_s);
+    shift::shifted(&mut aligned, delay_s);
+    Ok(aligned)
+}
+
+/// Whether a model explains the records better than another one, with fewer parts and an equal residual, or with as many
+/// and a smaller one.
+fn explains_more(
+    found: &Identification,
+    other: &Identification,
+    parts: fn(&Identification) -> usize,
+) -> bool {
+    let left =
+        |found: &Identification| found.fit.as_ref().map_or(f64::INFINITY, |fit| fit.relative);
+    match parts(found).cmp(&parts(other)) {
+        Ordering::Less => left(found) <= AS_GOOD * left(other),
+        Ordering::Equal => AS_GOOD * left(found) <= left(other),
+        Ordering::Greater => false,
+    }
+}
+
+/// Adds to a fitted delay; returns the sum.
+fn add_delay(result: &mut Identification, by_s: f64) -> f64 {
+    let mut delay_s = by_s;
+    let all = result.parameters.iter_mut();
+    for delay in all.filter(|parameter| parameter.name == "delay") {
         delay_s += delay.value();
         *delay = NamedEstimate::new("delay", "s", delay_s, delay.std());
     }
-    shift::warn(&mut aligned, delay_s);
-    Ok(aligned)
+    delay_s
+}
+
+/// What explains the records better: a declared recorder in the measured channel, or in both, where it cancels. A fitted
+/// delay comes on top of the declared one.
+pub(super) fn behind_recorder(
+    measured: Result<Identification, Failure>,
+    both: Result<Identification, Failure>,
+    declared_s: f64,
+) -> Result<Identification, Failure> {
+    let parts = |found: &Identification| {
+        let has_lag = ["delay", "low_pass"]
+            .iter()
+            .any(|name| found.get(name).is_some());
+        2 * found.modes.len() + usize::from(has_lag)
+    };
+    let is_both = match (&measured, &both) {
+        (Ok(measured), Ok(both)) => explains_more(both, measured, parts),
+        (measured, _) => measured.is_err(),
+    };
+    let (mut result, how) = match is_both && both.is_ok() {
+        true => (both?, "is in both channels, so that it cancels"),
+        false => (measured?, "of the measured channel is part of the model"),
+    };
+    result
+        .method
+        .push(format!("the [recorder] of the stand file {how}"));
+    add_delay(&mut result, declared_s);
+    Ok(result)
 }

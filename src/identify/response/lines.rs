@@ -129,7 +129,8 @@ pub(super) fn data(powers: &Powers, set: &Set, lines: &Lines, options: &Response
         response,
         order: options.order,
         added_rate: set.added_rate,
-        with_delay: options.with_delay,
+        lag: options.lag,
+        recorder: options.recorder,
         below: !(options.grounded && options.modes.is_some_and(|modes| modes > 1)),
     }
 }

@@ -20,6 +20,7 @@ mod whole;
 
 use clap::ValueEnum;
 use num_complex::Complex64;
+use torqcomp_dsp::recorder::Recorder;
 use torqcomp_model::Covariance;
 
 use super::mode::all_or_none;
@@ -28,6 +29,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::print::rounded;
 use blocks::Set;
 use lines::Lines;
+pub use modal::Lag;
 use modal::{Data, Effort, Modal};
 pub(crate) use present::RATIO;
 
@@ -72,17 +74,20 @@ pub struct ResponseOptions {
     pub segment: Option<usize>,
     /// Order of the measured derivative of displacement: 0, 1 or 2.
     pub order: i32,
-    /// Whether a delay is fitted.
-    pub with_delay: bool,
+    /// The lag of the measured channel that is fitted, if any.
+    pub lag: Option<Lag>,
+    /// The recorder of the measured channel, if it is declared and has a low-pass or a delay.
+    pub recorder: Option<Recorder>,
     /// Whether several modes are those of a stand on its spring, without free motion below them.
     pub grounded: bool,
 }
 
 impl ResponseOptions {
-    /// The same with a delay if a model has one.
-    fn with_delay_of(&self, modal: Option<&Modal>) -> Self {
+    /// The same with the lag of a model, if it has one.
+    fn with_lag_of(&self, modal: Option<&Modal>) -> Self {
+        let found = modal.filter(|modal| modal.delay_s != 0.0);
         Self {
-            with_delay: self.with_delay || modal.is_some_and(|modal| modal.delay_s != 0.0),
+            lag: found.map(|modal| modal.lag).or(self.lag),
             ..*self
         }
     }
@@ -93,6 +98,22 @@ impl ResponseOptions {
 /// # Errors
 /// If the records show no response.
 pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identification, Failure> {
+    let Some(recorder) = options.recorder else {
+        return behind(records, options);
+    };
+    let without = ResponseOptions {
+        recorder: None,
+        ..*options
+    };
+    late::behind_recorder(
+        behind(records, options),
+        behind(records, &without),
+        recorder.delay_s(),
+    )
+}
+
+/// Evaluates records behind a recorder, if one is given.
+fn behind(records: &[Driven], options: &ResponseOptions) -> Result<Identification, Failure> {
     let cut = |records: &[Driven]| {
         let mut result = Identification::new("response");
         let set = blocks::blocks(records, options, &mut result)?;
@@ -106,7 +127,7 @@ pub fn identify(records: &[Driven], options: &ResponseOptions) -> Result<Identif
     }
     let aligned = late::aligned(records, lag);
     let with_rest = ResponseOptions {
-        with_delay: true,
+        lag: Some(Lag::Delay),
         ..*options
     };
     let found = cut(&aligned).and_then(|(result, of)| evaluate(&aligned, &with_rest, of, result));
@@ -132,13 +153,13 @@ fn evaluate(
         true => Failure::failed(ErrorCode::UnsuitableRecord, check::LEADS),
         false => failure,
     })?;
-    let is_asked = options.with_delay;
-    let late = shift::of((&set, &lines), options, (&data, &coarse), &mut result)?;
-    let options = &options.with_delay_of(late.as_ref());
+    let asked = options.lag;
+    let late = shift::of((&set, &lines), options, (&data, &coarse))?;
+    let options = &options.with_lag_of(late.as_ref());
     let coarse = late.unwrap_or(coarse);
     let is_grounded = options.grounded && coarse.poles.len() > 1;
     let data = Data {
-        with_delay: options.with_delay,
+        lag: options.lag,
         below: !is_grounded,
         ..data
     };
@@ -152,7 +173,8 @@ fn evaluate(
     if order::is_unexplained(&held_out) && is_poor {
         return Err(order::unexplained());
     }
-    let options = &options.with_delay_of(Some(&fitted.modal));
+    let options = &options.with_lag_of(Some(&fitted.modal));
+    shift::warn(&mut result, &fitted.modal, asked);
     if leads && check::is_out_of_reach(&set, &fitted.modal) {
         return Err(Failure::failed(ErrorCode::UnsuitableRecord, check::LEADS));
     }
@@ -165,7 +187,7 @@ fn evaluate(
     }
     check::doubts(&mut result, &fitted, leads);
     result.fit = Some(present::quality(&set, &lines, &fitted));
-    result.held_out_errors = match fitted.modal.delay_s == 0.0 || is_asked {
+    result.held_out_errors = match fitted.modal.delay_s == 0.0 || asked == Some(fitted.modal.lag) {
         true => held_out,
         false => order::of_given(&set, &lines, options, &fitted.modal)?,
     };
@@ -279,12 +301,10 @@ fn final_fit(
                 .to_owned(),
         );
         let late = shift::of_whole(whole, set, options, (data, &fitted))?;
-        if let Some(late) = &late {
-            shift::warn(result, late.modal.delay_s);
-        }
-        return Ok(late.unwrap_or(fitted));
+        return shift::filtered_whole(whole, set, data, late.unwrap_or(fitted));
     }
-    let mut modal = data.fit(&coarse.poles, coarse.delay_s, Effort::Fine)?;
+    let (data, mut modal) = shift::filtered((set, lines), data, coarse)?;
+    let data = &data;
     check::leakage(result, set, &modal);
     let searched = modal.fit.as_ref().map_or(0, |fit| fit.values.len());
     if scatter::is_of_force(set, lines, data, &modal) {
@@ -292,7 +312,7 @@ fn final_fit(
     }
     let all = scatter::of_all(set, lines, data, &modal)?;
     let of_poles = scatter::of_poles(set, lines, data, &modal)?;
-    if data.with_delay {
+    if data.lag.is_some() {
         modal.delay_std_s = of_poles.std(2 * modal.poles.len());
     }
     foreign::mark(&mut modal, &of_poles, set);

@@ -1,9 +1,10 @@
-//! Rational model of a frequency response: modes, residual terms and a delay.
+//! Rational model of a frequency response: modes, residual terms, a lag and the declared recorder.
 //!
 //! ```text
-//! H(s) = s^m [ Σ R_k/(s − p_k) + R_k*/(s − p_k*) + c_1 + c_2/s² ] e^{−sτ},   p_k = −σ_k + jω_k
+//! H(s) = s^m [ Σ R_k/(s − p_k) + R_k*/(s − p_k*) + c_1 + c_2/s² ] e^{−sτ} L(s),   p_k = −σ_k + jω_k
 //! ```
 //!
+//! L is the recorder of the measured channel, if declared; an RC low-pass 1/(1 + sτ) may take the place of the delay.
 //! m is 0 for displacement, 1 for speed, 2 for acceleration; c_1 represents modes above the band, c_2 those below and
 //! free motion. Residues and c are linear and follow from the poles, so only poles and delay are searched for (variable
 //! projection: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973), 413).
@@ -11,7 +12,7 @@
 //! An exponential window e^{−at} on both signals moves the whole response: H(s + a) takes the place of H(s), also in the
 //! factor of the delay, e^{−(s+a)τ}.
 //!
-//! With a delay, the modes are normal modes, R_k = −j A_k with a real A_k (D. J. Ewins, Modal Testing, 2nd ed., 2000,
+//! With a lag, the modes are normal modes, R_k = −j A_k with a real A_k (D. J. Ewins, Modal Testing, 2nd ed., 2000,
 //! 2.4). Complex residues would make the delay unidentifiable: s [R/(s − p) + R*/(s − p*)] = R p/(s − p) + R* p*/(s −
 //! p*) + 2 Re R, so the derivative of the model with respect to τ is a sum of its columns, and those of second order in
 //! τ are as well while R is imaginary.
@@ -25,6 +26,7 @@ use torqcomp_model::fit::{Fit, FitError, Options, Parameter, Residuals, linear, 
 
 use super::foreign::Foreign;
 use crate::identify::Pole;
+use torqcomp_dsp::recorder::Recorder;
 
 /// A response at lines of a band, with weights.
 #[derive(Debug, Clone)]
@@ -39,10 +41,39 @@ pub(super) struct Data {
     pub order: i32,
     /// Decay rate in 1/s that the window adds to every mode.
     pub added_rate: f64,
-    /// Whether a delay is fitted.
-    pub with_delay: bool,
+    /// The lag that is fitted, if any.
+    pub lag: Option<Lag>,
+    /// The recorder of the measured channel, as declared.
+    pub recorder: Option<Recorder>,
     /// Whether c₂ is fitted: a stand on its spring has no free motion.
     pub below: bool,
+}
+
+/// How the measured channel lags by τ.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Lag {
+    /// A delay, e^{−sτ}.
+    #[default]
+    Delay,
+    /// An RC low-pass, 1/(1 + sτ), as of an amplifier.
+    LowPass,
+}
+
+impl Lag {
+    fn factor(self, turn: Complex64) -> Complex64 {
+        match self {
+            Self::Delay => (-turn).exp(),
+            Self::LowPass => 1.0 / (1.0 + turn),
+        }
+    }
+
+    /// Derivative of the logarithm of the factor with respect to τ, in 1/s.
+    pub(super) fn slope(self, s: Complex64, lag_s: f64) -> Complex64 {
+        match self {
+            Self::Delay => -s,
+            Self::LowPass => -s / (1.0 + s * lag_s),
+        }
+    }
 }
 
 /// Longest delay in half periods of the highest frequency.
@@ -64,6 +95,8 @@ pub(super) struct Modal {
     pub poles: Vec<Pole>,
     /// τ in s.
     pub delay_s: f64,
+    /// What τ means.
+    pub lag: Lag,
     /// Linear parameters: real and imaginary part of each residue, then c₁ and, if it was fitted, c₂.
     linear: Vec<f64>,
     /// Standard uncertainty of τ in s, if it was fitted and is identifiable.
@@ -103,7 +136,7 @@ impl Data {
 
     /// Whether a linear parameter of a model with this many modes is zero: with a delay, the real part of a residue.
     pub(super) fn is_zero(&self, linear: usize, modes: usize) -> bool {
-        self.with_delay && linear < 2 * modes && linear.is_multiple_of(2)
+        self.lag.is_some() && linear < 2 * modes && linear.is_multiple_of(2)
     }
 
     /// The columns at a frequency, written to `all`; zero for parameters that are zero.
@@ -113,7 +146,7 @@ impl Data {
         all.clear();
         for pole in poles {
             let (near, far) = self.fractions(s, *pole, scale);
-            all.push(match self.with_delay {
+            all.push(match self.lag.is_some() {
                 true => Complex64::ZERO,
                 false => front * (near + far),
             });
@@ -130,7 +163,11 @@ impl Data {
         let s = Complex64::new(self.added_rate, omega) / scale;
         let late = match delay_s == 0.0 {
             true => Complex64::ONE,
-            false => (-s * (scale * delay_s)).exp(),
+            false => self.lag.unwrap_or_default().factor(s * (scale * delay_s)),
+        };
+        let late = match &self.recorder {
+            Some(recorder) => late * recorder.transfer(s * scale),
+            None => late,
         };
         let power = match self.order {
             0 => Complex64::ONE,
@@ -213,7 +250,7 @@ impl Data {
             |f| (problem.poles(&f.values), problem.delay(&f.values)),
         );
         let linear = self.solve(&poles, delay_s)?.values;
-        let delay_std_s = fit.as_ref().filter(|_| self.with_delay);
+        let delay_std_s = fit.as_ref().filter(|_| self.lag.is_some());
         let delay_std_s = delay_std_s.and_then(|f| f.std[2 * poles.len()]);
         let modal = self.modal_of(&poles, (delay_s, delay_std_s), &linear);
         Ok(Modal { fit, ..modal })
@@ -235,6 +272,7 @@ impl Data {
             response: self.omega.iter().map(model).collect(),
             poles: poles.to_vec(),
             delay_s: delay_s.0,
+            lag: self.lag.unwrap_or_default(),
             delay_std_s: delay_s.1,
             linear: linear.to_vec(),
             fit: None,
@@ -256,11 +294,15 @@ impl Data {
             let omega = Parameter::new(format!("omega {}", k + 1), omega);
             parameters.push(omega.at_least(0.4 * low).at_most(1.3 * high));
         }
-        if self.with_delay {
+        if self.lag.is_some() {
             let most_s = self.longest_delay_s();
             let start_s = start_s.clamp(-most_s, most_s);
             let delay = Parameter::new("delay", start_s).scaled(most_s / DELAY_HALF_PERIODS);
-            parameters.push(delay.at_least(-most_s).at_most(most_s));
+            let least_s = match self.lag {
+                Some(Lag::LowPass) => 0.0,
+                _ => -most_s,
+            };
+            parameters.push(delay.at_least(least_s).at_most(most_s));
         }
         parameters
     }
@@ -297,7 +339,7 @@ impl PoleSearch<'_> {
     }
 
     fn delay(&self, p: &[f64]) -> f64 {
-        if self.data.with_delay {
+        if self.data.lag.is_some() {
             p[2 * self.modes]
         } else {
             0.0
@@ -326,9 +368,9 @@ impl PoleSearch<'_> {
             all.push(-front * (a + b));
             all.push(front * Complex64::I * (a - b));
         }
-        if self.data.with_delay {
+        if let Some(lag) = self.data.lag {
             let model: Complex64 = columns.iter().zip(linear).map(|(c, v)| c * v).sum();
-            all.push(-s * scale * model);
+            all.push(lag.slope(s * scale, delay_s) * model);
         }
     }
 }
@@ -507,7 +549,8 @@ mod tests {
                 omega: omega.clone(),
                 order,
                 added_rate: 0.0,
-                with_delay: false,
+                lag: None,
+                recorder: None,
                 below: true,
             };
             let fitted = data.fit(&[pole], 0.0, Effort::Fine).unwrap();

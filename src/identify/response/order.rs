@@ -28,9 +28,9 @@ pub(super) fn grow(
     so_far: &Modal,
     options: &ResponseOptions,
 ) -> Result<Option<Modal>, Failure> {
-    if data.with_delay && so_far.poles.is_empty() {
+    if data.lag.is_some() && so_far.poles.is_empty() {
         let prompt = Data {
-            with_delay: false,
+            lag: None,
             ..data.clone()
         };
         let Some(first) = grow(&prompt, so_far, options)? else {

@@ -6,7 +6,7 @@ use torqcomp_dsp::frf::{self, Estimator, Frf, Window};
 use super::blocks::Set;
 use super::lines::Lines;
 use super::order::folds;
-use super::{FinalFit, Modal, ResponseOptions, foreign};
+use super::{FinalFit, Lag, Modal, ResponseOptions, foreign, shift};
 use crate::chart::{Chart, Series};
 use crate::identify::{Comparison, FitQuality, Identification, NamedEstimate};
 use crate::print::{plural, relative, rounded, short};
@@ -64,11 +64,15 @@ pub(super) fn method(
             true => "residual terms for modes outside the band",
             false => "a residual compliance for modes above the band",
         },
-        if options.with_delay { ", a delay" } else { "" }
+        match options.lag {
+            Some(Lag::Delay) => ", a delay",
+            Some(Lag::LowPass) => ", an RC low-pass of the measured channel",
+            None => "",
+        }
     ));
 }
 
-/// Adds hold-out error, static gain and delay.
+/// Adds hold-out error, static gain and lag.
 pub(super) fn other_constants(
     result: &mut Identification,
     set: &Set,
@@ -93,10 +97,14 @@ pub(super) fn other_constants(
         let gain = NamedEstimate::new("static_gain", "", fitted.at_rest(), found.static_gain_std);
         result.parameters.push(gain);
     }
-    if options.with_delay {
-        let delay = NamedEstimate::new("delay", "s", fitted.delay_s, fitted.delay_std_s);
-        result.parameters.push(delay);
-    }
+    let (lag_s, std_s) = (fitted.delay_s, fitted.delay_std_s);
+    result.parameters.extend(options.lag.map(|lag| match lag {
+        Lag::Delay => NamedEstimate::new("delay", "s", lag_s, std_s),
+        Lag::LowPass => {
+            let hz = shift::low_pass_hz(lag_s);
+            NamedEstimate::new("low_pass", "Hz", hz, std_s.map(|std_s| std_s / lag_s * hz))
+        }
+    }));
 }
 
 /// How well a model follows the measured signal in the band, in the rms over all blocks.

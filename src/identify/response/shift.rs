@@ -9,7 +9,7 @@ use super::foreign;
 use super::lines::Lines;
 use super::order::{best_of_whole, grow};
 use super::whole::Whole;
-use super::{Data, Effort, FinalFit, Modal, ResponseOptions, scatter};
+use super::{Data, Effort, FinalFit, Lag, Modal, ResponseOptions, scatter};
 use crate::failure::Failure;
 use crate::identify::Identification;
 use crate::print::rounded;
@@ -44,14 +44,13 @@ pub(super) fn of(
     (set, lines): (&Set, &Lines),
     options: &ResponseOptions,
     (data, coarse): (&Data, &Modal),
-    result: &mut Identification,
 ) -> Result<Option<Modal>, Failure> {
     // Leakage hides a delay; in whole records it is part of the model.
-    if data.with_delay || options.modes.is_some() || set.window == Window::Hann {
+    if data.lag.is_some() || options.modes.is_some() || set.window == Window::Hann {
         return Ok(None);
     }
     let data = Data {
-        with_delay: true,
+        lag: Some(Lag::Delay),
         ..data.clone()
     };
     let has_stand_in = foreign::has_out_of_band(coarse);
@@ -68,7 +67,6 @@ pub(super) fn of(
             false => (0.5 * fewer as f64 * numbers.ln() / numbers).exp(),
         };
         if (is_known || has_stand_in) && set.error(&late.response, lines) <= slack * least {
-            warn(result, late.delay_s);
             return Ok(Some(late));
         }
     }
@@ -87,11 +85,11 @@ pub(super) fn of_whole(
     options: &ResponseOptions,
     (data, fitted): (&Data, &FinalFit),
 ) -> Result<Option<FinalFit>, Failure> {
-    if data.with_delay {
+    if data.lag.is_some() {
         return Ok(None);
     }
     let data = Data {
-        with_delay: true,
+        lag: Some(Lag::Delay),
         ..data.clone()
     };
     let most = match options.modes {
@@ -129,7 +127,7 @@ pub(super) fn refined(
     coarse: &Modal,
 ) -> Result<Option<FinalFit>, Failure> {
     match whole.refine(data, coarse, set) {
-        None if data.with_delay => best_delay(whole, set, data, coarse),
+        None if data.lag.is_some() => best_delay(whole, set, data, coarse),
         found => Ok(found),
     }
 }
@@ -144,7 +142,7 @@ fn best_delay(
     modal: &Modal,
 ) -> Result<Option<FinalFit>, Failure> {
     let fixed = Data {
-        with_delay: false,
+        lag: None,
         ..data.clone()
     };
     let mut best: Option<FinalFit> = None;
@@ -244,17 +242,97 @@ fn turned_by(modal: &Modal) -> f64 {
     turn.map_or(0.0, |(turn, _)| turn.cos().abs())
 }
 
+/// The same data with an RC low-pass of the measured channel in place of a fitted delay, which it resembles; `None` if the
+/// channel leads or a low-pass is declared.
+fn with_low_pass(data: &Data, delayed: &Modal) -> Option<Data> {
+    let is_possible = delayed.delay_s > 0.0
+        && delayed.lag == Lag::Delay
+        && !data
+            .recorder
+            .is_some_and(|recorder| recorder.has_low_pass());
+    is_possible.then(|| Data {
+        lag: Some(Lag::LowPass),
+        ..data.clone()
+    })
+}
+
+/// The fit of whole records with a low-pass in place of the delay of `fitted`, if its residual is clearly smaller.
+///
+/// # Errors
+/// If there are too few lines.
+pub(super) fn filtered_whole(
+    whole: &mut Whole,
+    set: &Set,
+    data: &Data,
+    fitted: FinalFit,
+) -> Result<FinalFit, Failure> {
+    let Some(data) = with_low_pass(data, &fitted.modal) else {
+        return Ok(fitted);
+    };
+    let start = data.fit(&fitted.modal.poles, fitted.modal.delay_s, Effort::Coarse)?;
+    let is_better = |found: &FinalFit| {
+        found.modal.delay_s > 0.0 && found.relative < CLEARLY_LESS * fitted.relative
+    };
+    let found = whole.refine(&data, &start, set).filter(is_better);
+    Ok(found.unwrap_or(fitted))
+}
+
+/// The fit of the averaged response, with a low-pass in place of a delay if its error is clearly smaller, and its data.
+///
+/// # Errors
+/// If there are too few lines.
+pub(super) fn filtered(
+    (set, lines): (&Set, &Lines),
+    data: &Data,
+    coarse: &Modal,
+) -> Result<(Data, Modal), Failure> {
+    let fitted = data.fit(&coarse.poles, coarse.delay_s, Effort::Fine)?;
+    if let Some(data) = with_low_pass(data, &fitted) {
+        let found = data.fit(&fitted.poles, fitted.delay_s, Effort::Fine)?;
+        let error = |modal: &Modal| set.error(&modal.response, lines);
+        if found.delay_s > 0.0 && error(&found) < CLEARLY_LESS * error(&fitted) {
+            return Ok((data, found));
+        }
+    }
+    Ok((data.clone(), fitted))
+}
+
+/// Reports a lag that was not asked for.
+pub(super) fn warn(result: &mut Identification, modal: &Modal, asked: Option<Lag>) {
+    match modal.lag {
+        _ if modal.delay_s == 0.0 => {}
+        Lag::Delay if asked == Some(Lag::Delay) => {}
+        Lag::Delay => shifted(result, modal.delay_s),
+        Lag::LowPass => result.warn(
+            "low-pass-fitted",
+            format!(
+                "the measured channel lags as behind an RC low-pass of {} Hz, which was fitted and explains more than a \
+                 delay; check the filter of the amplifier, or record both channels with the same filters",
+                rounded(low_pass_hz(modal.delay_s), 3)
+            ),
+        ),
+    }
+}
+
+/// Cut-off in Hz of an RC low-pass with this time constant.
+pub(super) fn low_pass_hz(time_constant_s: f64) -> f64 {
+    1.0 / (2.0 * PI * time_constant_s)
+}
+
 /// Reports which channel is late.
-pub(super) fn warn(result: &mut Identification, delay_s: f64) {
-    let which = match delay_s < 0.0 {
-        true => "applied",
-        false => "measured",
+pub(super) fn shifted(result: &mut Identification, delay_s: f64) {
+    let (which, or) = match delay_s < 0.0 {
+        true => ("applied", ""),
+        false => (
+            "measured",
+            ", or declare the low-pass of the measured channel as [recorder] low_pass",
+        ),
     };
     result.warn(
         "channels-shifted",
         format!(
             "the {which} channel lags the other by about {} ms: a delay was fitted, as with --delay, which explains \
-             more than modes alone; check that one recorder takes both channels, with the same filters",
+             more than modes alone; check that one recorder takes both channels, with the same filters{or}",
             rounded(1e3 * delay_s.abs(), 3)
         ),
     );

@@ -67,7 +67,7 @@ impl<'a> Parameters<'a> {
 
     /// Number of poles' parameters and delay.
     pub fn searched(&self) -> usize {
-        2 * self.modes + usize::from(self.shape.with_delay)
+        2 * self.modes + usize::from(self.shape.lag.is_some())
     }
 
     /// Number of shared parameters.
@@ -181,8 +181,8 @@ impl<'a> Parameters<'a> {
             (out[a], out[b]) = (Complex64::new(*p, 0.0), Complex64::new(0.0, *p));
             transient += Complex64::new(own[a], own[b]) * p;
         }
-        if self.shape.with_delay {
-            out[searched + n] = Complex64::new(0.0, -omega) * driven;
+        if let Some(lag) = self.shape.lag {
+            out[searched + n] = lag.slope(s * scale, state.delay_s) * driven;
         }
         out[from + n] = front;
         if self.shape.below {
@@ -206,7 +206,7 @@ impl Solved {
             pole.rate_per_s += part * self.step[2 * j];
             pole.omega_rad_per_s += part * self.step[2 * j + 1];
         }
-        if layout.shape.with_delay {
+        if layout.shape.lag.is_some() {
             next.delay_s += part * self.step[n];
         }
         let from = layout.searched();
@@ -224,16 +224,15 @@ impl Solved {
     /// Standard uncertainty of the delay, if there is one.
     pub fn delay_std(&self, layout: &Parameters) -> Option<f64> {
         let at = 2 * layout.modes;
-        layout
-            .shape
-            .with_delay
-            .then(|| self.covariance[(at, at)].sqrt())
+        layout.shape.lag.map(|_| self.covariance[(at, at)].sqrt())
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::modal::Lag;
     use super::*;
+    use torqcomp_dsp::recorder::Recorder;
 
     fn shape(order: i32) -> Data {
         Data {
@@ -242,7 +241,8 @@ mod tests {
             weight: vec![1.0; 3],
             order,
             added_rate: 0.0,
-            with_delay: true,
+            lag: Some(Lag::Delay),
+            recorder: None,
             below: true,
         }
     }
@@ -264,7 +264,11 @@ mod tests {
             weight: vec![1.0],
         };
         for order in 0..3 {
-            let shape = shape(order);
+            let shape = Data {
+                lag: Some([Lag::Delay, Lag::LowPass, Lag::Delay][order as usize]),
+                recorder: Recorder::new(1.0, None, 1e-3).ok().filter(|_| order == 2),
+                ..shape(order)
+            };
             let layout = Parameters::of(&shape, 2);
             let number = |i: usize| ((i * i + 3) as f64 * 0.7).sin();
             let state = ParameterValues {
