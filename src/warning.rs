@@ -78,7 +78,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["free-body", "the body has no spring: a known spring ties both it and the model to the measured motion, and the errors are those of the applied quantity", "use constants and effects as they are; to predict the motion, add the spring that the stand will have"],
         ["no-record-held-out", "no hold-out record was given; the last 30 % of each training record, or the last decay, are held out instead", "give --holdout or --holdout-decay"],
         ["declared-not-refitted", "the declared effects, refitted to the training records, diverge on the hold-out records; the stand file is used as it is", "check the declared effects; diagnose without them and compare"],
-        ["gain-differs", "the static gain from known loads differs from that of the stand file, units or other records", "check the calibration and the lever arm of the loads"],
+        ["gain-differs", "the static gain from known loads, or from a response test, differs from that of the stand file, units or other records, which is kept", "check the calibration, and the lever arm of loads or forces"],
         ["running-differs", "in use, the resonance is not that of the fitted stand", "compare with a record at another speed, as the torque may have a peak there; fit records taken as the stand is used, with the same clamping, temperature and parts mounted"],
         ["resonance-hidden", "a running record does not show the resonance of the stand", "record for longer, at a higher rate, while the speed rises through the resonance, or with a rougher torque"],
         ["loads-contradict-effects", "known loads do not confirm the effects found", "record hits of other sizes, and examine the loads with identify static"],

@@ -11,7 +11,8 @@ use torqcomp_model::{Chain, Estimate};
 use super::fit::FittedModel;
 use super::result::Diagnosis;
 use crate::failure::{ErrorCode, Failure};
-use crate::print::{rounded, with_std};
+use crate::print::rounded;
+use crate::stand::gain_differs;
 use crate::warning::Warning;
 
 /// Loads and readings, in SI units, in the order of measurement.
@@ -27,8 +28,10 @@ const MOST: usize = 256;
 const FEWEST: usize = 3;
 /// Significance level of the test that one of two models scatters more.
 const BY_CHANCE: f64 = 0.01;
-/// Minimum difference of two gains, in standard uncertainties and relative to the gain.
-const GAINS_DIFFER: (f64, f64) = (3.0, 1e-3);
+
+/// The gain that known loads are compared with, and the advice if theirs differs.
+const OF_KNOWN: &str =
+    "from stand file, units or other records: check the calibration and the lever arm of the loads";
 
 /// What known loads say.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -229,7 +232,8 @@ impl Diagnosis {
             false => declared_gain,
         };
         let known = known.map(|known| printed((known.value(), known.std_uncertainty())));
-        let differ = known.and_then(|known| gains_differ((gain, gain_std), known, &gain_unit));
+        let found = ("the known loads give", "static gain", gain_unit.as_str());
+        let differ = known.and_then(|known| gain_differs(found, (gain, gain_std), known, OF_KNOWN));
         let contradicted = (!self.effects.is_empty())
             .then(|| contradicted(loads, &before, &after, &self.effects))
             .flatten();
@@ -252,32 +256,6 @@ impl Diagnosis {
         self.warnings.extend(differ.into_iter().chain(contradicted));
         Ok(())
     }
-}
-
-/// Warns that the loads give a gain other than the declared or fitted one.
-fn gains_differ(
-    (gain, gain_std): (f64, Option<f64>),
-    (known, known_std): (f64, Option<f64>),
-    unit: &str,
-) -> Option<Warning> {
-    let std = gain_std.unwrap_or(0.0).hypot(known_std.unwrap_or(0.0));
-    let apart = (gain - known).abs();
-    let (times, part) = GAINS_DIFFER;
-    (apart > times * std && apart > part * known.abs()).then(|| {
-        let by_loads = match gain_std {
-            Some(std) => with_std(gain, std),
-            None => rounded(gain, 6),
-        };
-        Warning::new(
-            "gain-differs",
-            format!(
-                "the known loads give a static gain of {by_loads} {unit}, {} times the {} {unit} from stand file, \
-                 units or other records: check the calibration and the lever arm of the loads",
-                rounded(gain / known, 4),
-                rounded(known, 6)
-            ),
-        )
-    })
 }
 
 /// Warns that the loads contradict the effects.

@@ -1,7 +1,37 @@
 //! Warnings about the gain between bridge and record.
 
 use super::{Stand, TransducerSignal};
+use crate::print::{rounded, with_std};
 use crate::warning::Warning;
+
+/// Minimum difference of two gains, in standard uncertainties and relative to the gain.
+const GAINS_DIFFER: (f64, f64) = (3.0, 1e-3);
+
+/// A warning if a test gives a gain other than the known one, both with their standard uncertainties.
+pub(crate) fn gain_differs(
+    (source, name, unit): (&str, &str, &str),
+    (gain, gain_std): (f64, Option<f64>),
+    (known, known_std): (f64, Option<f64>),
+    of_known: &str,
+) -> Option<Warning> {
+    let std = gain_std.unwrap_or(0.0).hypot(known_std.unwrap_or(0.0));
+    let apart = (gain - known).abs();
+    let (times, part) = GAINS_DIFFER;
+    (apart > times * std && apart > part * known.abs()).then(|| {
+        let found = match gain_std {
+            Some(std) => with_std(gain, std),
+            None => rounded(gain, 6),
+        };
+        Warning::new(
+            "gain-differs",
+            format!(
+                "{source} a {name} of {found} {unit}, {} times the {} {unit} {of_known}",
+                rounded(gain / known, 4),
+                rounded(known, 6)
+            ),
+        )
+    })
+}
 
 impl Stand {
     /// A warning if the gain between bridge and record is not given.

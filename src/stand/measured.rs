@@ -38,10 +38,14 @@ impl MeasuredCalibration {
     /// The constant, if it is for volts.
     #[must_use]
     pub fn torque_per_volt(&self) -> Option<&Estimate> {
+        self.constant_of(TransducerSignal::Voltage)
+    }
+
+    /// The constant, if it is for this signal.
+    #[must_use]
+    pub fn constant_of(&self, signal: TransducerSignal) -> Option<&Estimate> {
         match &self.law {
-            CalibrationLaw::Constant(constant) if self.signal == TransducerSignal::Voltage => {
-                Some(constant)
-            }
+            CalibrationLaw::Constant(constant) if self.signal == signal => Some(constant),
             _ => None,
         }
     }

@@ -33,6 +33,7 @@ use crate::warning::Warning;
 pub use calibration::{Applied, Calibration, RecordedLevels, applied_by_unit};
 pub use effects::{DeclaredEffect, derivative};
 pub use file::{calibration_of, parse, read, recorder_of, text};
+pub(crate) use gain::gain_differs;
 pub use measured::{AT_TORQUE, CalibrationLaw, MeasuredCalibration};
 pub use modes::{DeclaredMode, MODE_CORRELATIONS};
 pub use rated::off_rated;

@@ -274,6 +274,38 @@ fn responses_of_nonsense_are_refused() {
     run(&["odd.csv"], "force", "beam").says(1, &["not uniform", "--rate"]);
 }
 
+/// A response that gives twice the declared torque per volt was kept without a word.
+#[test]
+fn a_response_that_contradicts_the_calibration_is_said() {
+    let folder = Folder::new();
+    let mut noise = Noise(44);
+    let x: Vec<f64> = (0..8000).map(|_| noise.normal()).collect();
+    let y = ringing_filter(&x);
+    table(&folder, "hits.csv", &[("torque [N m]", x), ("beam [V]", y)]);
+    let args = "identify response hits.csv --applied torque --measured beam --band 10..300";
+    let args: Vec<&str> = args.split(' ').collect();
+    let free = folder.json(&[&args[..], &["--json"]].concat());
+    let (value, std, _) = parameter(&free, "torque_per_volt");
+    assert!(std.is_some());
+    for (factor, is_said) in [(1.0, false), (0.5, true)] {
+        let declared = format!("torque_per_volt = \"{} N m/V\"", factor * value);
+        folder.write(
+            "s.toml",
+            format!("schema = \"torqcomp.stand/1\"\n[calibration]\n{declared}\n"),
+        );
+        let ran = folder.run(&[&args[..], &["-o", "s.toml"]].concat());
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        let says = "2 times the";
+        assert_eq!(
+            ran.stderr.contains("[gain-differs]") && ran.stderr.contains(says),
+            is_said,
+            "{}",
+            ran.stderr
+        );
+        assert!(folder.read("s.toml").contains(&declared));
+    }
+}
+
 /// The units of later records had been ignored: a gain 99 times too large, or 11 % too small, without a word.
 #[test]
 fn responses_in_other_units_are_converted() {

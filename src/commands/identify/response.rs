@@ -63,7 +63,7 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         None => entries(args, rad_per_n_m(args, &loaded, motion)?, &mut result)?,
     };
     entries.extend(recorder(&mut result, &source));
-    entries.extend(calibration(args, units, &mut result)?);
+    entries.extend(calibration(args, units, stand.as_ref(), &mut result)?);
     deliver(result, recorded, &args.findings, &entries)
 }
 
@@ -185,6 +185,7 @@ fn to_torque(force: &mut Channel, radius_m: f64) -> Result<(), Failure> {
 fn calibration(
     args: &Response,
     units: [Option<&NamedUnit>; 2],
+    stand: Option<&(String, String)>,
     result: &mut Identification,
 ) -> Result<Vec<Entry>, Failure> {
     let [Some(measured), Some(applied)] = units else {
@@ -211,18 +212,30 @@ fn calibration(
     let source = format!("identify response: {}", file_name::list(&args.inputs));
     let written = entry("calibration", key, &constant, &source);
     result.parameters.push(constant);
-    if std.is_none() {
-        // Its error is not identifiable from these records.
-        return Ok(Vec::new());
+    if let Some((name, text)) = stand {
+        let declared = stand::calibration_of(name, text)?;
+        result.warnings.extend(declared.and_then(|declared| {
+            let declared = declared.constant_of(signal)?;
+            let known = (size * declared.value(), declared.std_uncertainty());
+            let known = (known.0, known.1.map(|std| size * std));
+            stand::gain_differs(
+                ("the response gives", key.replace('_', " ").as_str(), unit),
+                (value, std),
+                known,
+                &format!(
+                    "that {name} declares, which is kept: check it, and unit and radius of --applied; to write the new \
+                     one, remove [calibration]"
+                ),
+            )
+        }));
     }
-    // Weights on the stand are more accurate than the static gain from a hammer test.
-    let stand = stand_text(&args.findings)?;
-    Ok(
-        match stand.is_some_and(|(_, text)| update::is_calibrated(&text)) {
-            true => Vec::new(),
-            false => vec![written],
-        },
-    )
+    // Weights on the stand are more accurate than the static gain from a hammer test, and without a standard uncertainty
+    // its error is not identifiable from these records.
+    let is_calibrated = stand.is_some_and(|(_, text)| update::is_calibrated(text));
+    Ok(match is_calibrated || std.is_none() {
+        true => Vec::new(),
+        false => vec![written],
+    })
 }
 
 /// Sets the unit of the static gain: measured channel over applied channel.
