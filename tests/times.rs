@@ -943,3 +943,141 @@ fn lost_samples_between_rounded_stamps_are_named_with_their_place() {
         );
     }
 }
+
+/// Two channels at different rates, or from different starts, each behind its own time: whatever the times are called,
+/// every verb takes the one beside the channel. Where their places do not show which is whose, it is asked for.
+#[test]
+fn each_channel_has_the_time_beside_it() {
+    let folder = Folder::new();
+    let rows = |order: [usize; 4], slow_hz: f64, start: f64| -> String {
+        let row = |i: usize| {
+            let t = i as f64;
+            let torque = 3.0 + (std::f64::consts::TAU * 20.0 * t / 5000.0).cos();
+            let cells = [
+                format!("{:.4}", t / slow_hz),
+                format!("{:.1}", 1500.0 + (t / 9.0).sin()),
+                format!("{:.4}", start + t / 5000.0),
+                format!("{torque:.6}"),
+            ];
+            order.map(|place| cells[place].clone()).join(";") + "\n"
+        };
+        (0..4000).map(row).collect()
+    };
+    let check = |heading: &str, start: f64| {
+        let report = folder.json(&["inspect", "in.csv", "--json"]);
+        let channels = report["channels"].as_array().unwrap();
+        let found = |place: usize, key: &str| channels[place][key].as_f64().unwrap_or(0.0);
+        assert_eq!(channels.len(), 2, "{heading}: {report}");
+        assert_eq!(
+            (found(1, "rate_hz"), found(1, "start")),
+            (5000.0, start),
+            "{heading}"
+        );
+        for args in [
+            &["compensate", "in.csv", "-o", "out.csv", "--force"][..],
+            &[
+                "harmonics",
+                "in.csv",
+                "--fundamental",
+                "20",
+                "--orders",
+                "1",
+            ],
+        ] {
+            let more = ["--channel", "2", "--stand", "stand.toml", "--json"];
+            let report = json(&folder.run(&[args, &more].concat()));
+            assert_eq!(
+                report["rate_hz"].as_f64(),
+                Some(5000.0),
+                "{heading} {args:?}"
+            );
+        }
+    };
+    for heading in [
+        "Speed_Time [s];Speed;Torque_Time [s]",
+        "Time [s];Speed;Torque Time [s]",
+        "Vib x [s];Vib y;Torque x [s]",
+        "Speed.time [s];Speed.value;Torque.time [s]",
+        "A - Time [s];A_Speed;Torque - Time [s]",
+        "X [s];Y;X2 [s]",
+        "Speed (s);Speed (rpm);Torque (s)",
+        "s;rpm;s",
+        "Time [s];Speed;t_Torque [s]",
+        "t [s];Speed;x [s]",
+        "Speed/Time [s];Speed;Torque/Time [s]",
+        "Time [s];Speed;Time [s]",
+    ] {
+        let torque = if heading.starts_with("s;") {
+            "Nm"
+        } else {
+            "Torque [Nm]"
+        };
+        for (slow_hz, start) in [(1000.0, 0.0), (5000.0, 0.5), (1000.0, 0.5)] {
+            let rows = rows([0, 1, 2, 3], slow_hz, start);
+            folder.write("in.csv", format!("{heading};{torque}\n{rows}"));
+            check(heading, start);
+        }
+    }
+    // The slower channel ends before.
+    let rows_of_both = rows([0, 1, 2, 3], 1000.0, 0.0);
+    let shorter = |(i, row): (usize, &str)| {
+        let fast = row.splitn(3, ';').last().unwrap();
+        if i < 800 {
+            format!("{row}\n")
+        } else {
+            format!(";;{fast}\n")
+        }
+    };
+    let rows_of_both: String = rows_of_both.lines().enumerate().map(shorter).collect();
+    let heading = "Speed_Time [s];Speed;Torque_Time [s];Torque [Nm]";
+    folder.write("in.csv", format!("{heading}\n{rows_of_both}"));
+    check(heading, 0.0);
+    for (heading, order) in [
+        (
+            "Time 1 - slow;Time 2 - fast;Speed;Torque [Nm]",
+            [0, 2, 1, 3],
+        ),
+        ("Time [s];Torque_Time [s];Speed;Torque [Nm]", [0, 2, 1, 3]),
+        ("Time [s];Speed;Torque [Nm];Torque_Time [s]", [0, 1, 3, 2]),
+        ("Time [s];Torque [Nm];Torque_Time [s];Speed", [0, 3, 2, 1]),
+        ("Speed;Time [s];Torque [Nm];Time2 [s]", [1, 0, 3, 2]),
+    ] {
+        folder.write("in.csv", format!("{heading}\n{}", rows(order, 1000.0, 0.0)));
+        let args = [
+            "compensate",
+            "in.csv",
+            "--channel",
+            "Torque",
+            "--stand",
+            "stand.toml",
+        ];
+        let run =
+            |more: &[&str]| folder.run(&[&args[..], &["-o", "out.csv", "--force"], more].concat());
+        run(&[]).says(1, &["at different rates", "--time-column"]);
+        let place = (order.iter().position(|cell| *cell == 2).unwrap() + 1).to_string();
+        let given = ["--time-column", &place, "--time-unit", "s"];
+        run(&given).says(0, &["4000 samples at 5000 Hz"]);
+    }
+    // A running channel of the same rate remains one, and hours of operation.
+    let hours = |i: i32| {
+        format!(
+            "{};0;{:.4};0\n",
+            f64::from(i) / 1e3,
+            1234.5 + f64::from(i) / 3.6e6
+        )
+    };
+    let hours: String = (0..4000).map(hours).collect();
+    folder.write(
+        "in.csv",
+        format!("Time [s];Torque [Nm];Operating time [h];Speed\n{hours}"),
+    );
+    let report = folder.json(&["inspect", "in.csv", "--json"]);
+    assert_eq!(report["channels"].as_array().unwrap().len(), 3, "{report}");
+    let same = rows([0, 1, 0, 3], 5000.0, 0.0);
+    folder.write(
+        "in.csv",
+        format!("Time [s];Speed;Runtime [s];Torque [Nm]\n{same}"),
+    );
+    let report = folder.json(&["inspect", "in.csv", "--json"]);
+    assert_eq!(report["channels"].as_array().unwrap().len(), 3, "{report}");
+}

@@ -81,6 +81,13 @@ pub fn time_stem(name: &str) -> Option<String> {
         .map(stem)
 }
 
+/// Whether a word of a name means time: `Torque_Time`, `torque.time`, `t_Torque`.
+#[must_use]
+pub fn has_time_word(name: &str) -> bool {
+    let mut words = name.split(|c: char| !c.is_alphanumeric());
+    words.any(is_time_name)
+}
+
 /// Whether a name means the horizontal axis, which is time unless the file says otherwise.
 #[must_use]
 pub fn is_axis_name(name: &str) -> bool {

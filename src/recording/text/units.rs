@@ -5,7 +5,7 @@ use torqcomp_model::{Dimension, RatioOf, Unit};
 use crate::unit::NamedUnit;
 
 pub use super::axis_names::{
-    is_axis_name, is_index_name, is_time_name, is_weak_time_name, spaced, time_stem,
+    has_time_word, is_axis_name, is_index_name, is_time_name, is_weak_time_name, spaced, time_stem,
 };
 use super::heading::split;
 use super::vocabulary::{has, meaning};

@@ -3,6 +3,7 @@
 mod groups;
 mod header_rate;
 mod left_out;
+mod own_clocks;
 mod places;
 mod stamps;
 
@@ -161,13 +162,17 @@ impl Sources<'_> {
             (0..count).filter(has_data).partition(|p| self.is_steps(*p));
         let mut roles = vec![Role::Nothing; count];
         steps.iter().for_each(|place| roles[*place] = Role::Time);
-        let named = self.time_places(&used)?;
+        let mut named = self.time_places(&used)?;
         let (index, rest): (Vec<usize>, Vec<usize>) = used.iter().partition(|place| {
             let counts = self.is_index(**place, &used)
                 || !named.times.is_empty() && self.is_row_label(**place, &used);
             counts && !named.times.contains(place)
         });
         index.iter().for_each(|place| roles[*place] = Role::Index);
+        if self.reading.time_column.is_none() {
+            let own = self.own_times(&named.times, &rest);
+            named.times.extend(own);
+        }
         let (mut rules, mut warnings) = (Vec::new(), Vec::new());
         warnings.extend(self.falling_time(&rest, &named.times));
         for group in groups(&named.times, &rest) {
@@ -176,6 +181,7 @@ impl Sources<'_> {
                 .iter()
                 .for_each(|place| roles[*place] = Role::Time);
             let rule = self.rule(&group, named.assumed.as_deref())?;
+            self.refuse_two_clocks(&group, &rule)?;
             warnings.extend(self.other_times(&group, &rule));
             warnings.extend(self.overridden_unit(&rule));
             // The time of columns without numbers is not a channel.

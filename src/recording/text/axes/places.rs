@@ -123,7 +123,7 @@ impl Sources<'_> {
     }
 
     /// Whether a time column is named like one of the first: by the same word, or both are dates.
-    fn repeats(&self, place: usize, first: &[usize]) -> bool {
+    pub(super) fn repeats(&self, place: usize, first: &[usize]) -> bool {
         let stem = |place: usize| units::time_stem(&self.fields[place].name);
         first.iter().any(|other| {
             self.fields[place].name == self.fields[*other].name

@@ -11,6 +11,9 @@ use crate::recording::{seconds_assumed, typical_step};
 use crate::unit::{NamedUnit, scale_in};
 use torqcomp_model::Unit;
 
+/// Seconds per unit of time stamps, where their unit is unknown.
+pub(super) const TIME_FACTORS: [f64; 6] = [1.0, 1e-3, 1e-6, 1e-9, 60.0, 3600.0];
+
 /// Derivation of stamps from the columns of a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StampRule {
@@ -391,7 +394,7 @@ fn name_of_unit(seconds: f64) -> &'static str {
 
 /// Seconds per unit of time stamps whose steps match a rate.
 pub(super) fn seconds_of_step(step: f64, hz: f64) -> Option<f64> {
-    [1.0, 1e-3, 1e-6, 1e-9, 60.0, 3600.0]
+    TIME_FACTORS
         .into_iter()
         .find(|factor| (step * factor * hz - 1.0).abs() < SAME)
 }
@@ -440,7 +443,7 @@ fn begin_anew(parts: &[f64], seconds: &[f64]) -> bool {
     falls.peek().is_some() && falls.all(|(_, second)| second[1] > second[0])
 }
 
-fn rises(values: &[f64]) -> bool {
+pub(super) fn rises(values: &[f64]) -> bool {
     let rising = values.windows(2).filter(|pair| pair[1] >= pair[0]).count();
     // A clock that was set back once remains a clock.
     100 * rising >= 99 * values.len().saturating_sub(1)
