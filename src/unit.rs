@@ -98,6 +98,25 @@ pub(crate) fn inside_brackets(heading: &str) -> Option<(&str, &str)> {
         })
 }
 
+/// The factor at the start of a text, and the rest: `1/100 s`, `x10ms`, `1e-3 s`, `10^-3 s`, `0,1 ms`.
+pub(crate) fn factor(text: &str) -> Option<(f64, &str)> {
+    let text = text
+        .trim()
+        .trim_start_matches(['x', '×', '*', '·'])
+        .trim_start();
+    let is_part =
+        |c: char| c.is_ascii_digit() || matches!(c, '.' | ',' | '/' | 'e' | 'E' | '^' | '-' | '+');
+    let end = text.find(|c: char| !is_part(c)).unwrap_or(text.len());
+    let (number, rest) = text.split_at(end);
+    let number = number.replace(',', ".");
+    let factor: f64 = match (number.split_once('/'), number.split_once('^')) {
+        (Some((above, below)), _) => above.parse::<f64>().ok()? / below.parse::<f64>().ok()?,
+        (_, Some((base, power))) => base.parse::<f64>().ok()?.powi(power.parse().ok()?),
+        _ => number.parse().ok()?,
+    };
+    (factor > 0.0 && factor.is_finite()).then(|| (factor, rest.trim()))
+}
+
 /// A power of ten next to a multiplication or division sign in a heading, as written there.
 pub(crate) fn scale_in(heading: &str) -> Option<String> {
     let is_mark = |c: char| matches!(c, 'x' | 'X' | '×' | '·' | '*' | '/');

@@ -769,4 +769,22 @@ fn doubtful_numbers_are_asked_or_said() {
         let is_said = codes(&report).contains(&"scale-in-heading".to_owned());
         assert_eq!(is_said, is_doubtful, "{heading}");
     }
+    // In the brackets of the unit it is asked about, and said if the unit is given.
+    for unit in [
+        "[x0.1 N m]",
+        "(10^-1 Nm)",
+        "(1/10 Nm)",
+        "(Nm/10)",
+        "(0.1Nm)",
+    ] {
+        folder.write("in.csv", record(&format!("T {unit}"), None, |c| c));
+        let said = refusal(&folder, &[]);
+        assert!(said.contains("contains a scale factor"), "{unit}: {said}");
+        let (_, report) = amplitude(&folder, &["--unit", "N m"]);
+        assert_eq!(codes(&report), ["scale-in-heading"], "{unit}");
+    }
+    // The unit of the heading in other words is no contradiction.
+    folder.write("in.csv", record("T [Nm]", None, |c| c));
+    let (_, report) = amplitude(&folder, &["--unit", "N m"]);
+    assert!(codes(&report).is_empty(), "{report}");
 }

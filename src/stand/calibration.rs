@@ -269,7 +269,7 @@ impl Stand {
             warnings: law
                 .warnings
                 .into_iter()
-                .chain(heading_scale::unapplied(channel.name))
+                .chain(heading_scale::unapplied(channel))
                 .chain(self.unused_zero(signal, named))
                 .collect(),
         })
@@ -368,6 +368,15 @@ impl Stand {
 /// Failure that asks for a unit.
 fn without_unit(channel: RecordedChannel) -> Failure {
     let name = channel.name;
+    if let Some(scaled) = heading_scale::scaled_unit(channel) {
+        return Failure::failed(
+            ErrorCode::UnitUnclear,
+            format_args!(
+                "the unit of the channel \"{name}\" contains a scale factor, \"{scaled}\"; scale the numbers to a plain unit \
+                 and rename the column, or give their unit with --unit if they are not scaled"
+            ),
+        );
+    }
     match channel.unit_text {
         None => Failure::failed(
             ErrorCode::UnitUnclear,

@@ -2,7 +2,7 @@
 
 use torqcomp_model::{Dimension, RatioOf, Unit};
 
-use crate::unit::NamedUnit;
+use crate::unit::{NamedUnit, factor};
 
 pub use super::axis_names::{
     has_time_word, is_axis_name, is_index_name, is_time_name, is_weak_time_name, spaced, time_stem,
@@ -279,21 +279,6 @@ pub fn scaled_time(heading: &str) -> Option<f64> {
     }
     let (factor, rest) = factor(behind)?;
     (rest.is_empty() && factor < 1.0).then_some(factor * unit_of(inside?)?)
-}
-
-/// The factor at the start of a text, and the rest: `1/100 s`, `x10ms`, `1e-3 s`, `10^-3 s`.
-fn factor(text: &str) -> Option<(f64, &str)> {
-    let text = text.trim().trim_start_matches(['x', '×', '*']).trim_start();
-    let is_part =
-        |c: char| c.is_ascii_digit() || matches!(c, '.' | '/' | 'e' | 'E' | '^' | '-' | '+');
-    let end = text.find(|c: char| !is_part(c)).unwrap_or(text.len());
-    let (number, rest) = text.split_at(end);
-    let factor: f64 = match (number.split_once('/'), number.split_once('^')) {
-        (Some((above, below)), _) => above.parse::<f64>().ok()? / below.parse::<f64>().ok()?,
-        (_, Some((base, power))) => base.parse::<f64>().ok()?.powi(power.parse().ok()?),
-        _ => number.parse().ok()?,
-    };
-    (factor > 0.0 && factor.is_finite()).then(|| (factor, rest.trim()))
 }
 
 /// Whether it is a unit of time.

@@ -11,7 +11,7 @@ use super::symbols::Symbol;
 /// For the grammar see the module [`quantity`](crate::quantity). A number in this unit times
 /// [`Unit::factor`] is the number in kg, m, s, A, K and rad. One hertz is one cycle of 2π rad per
 /// second.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Unit {
     factor: f64,
     dimension: Dimension,
@@ -37,6 +37,17 @@ impl UnitParts {
             strain: self.strain || other.strain,
             hertz: self.hertz || other.hertz,
         }
+    }
+}
+
+/// By meaning: `Nm` is `N m`, of whose parts one could be that of a strain.
+impl PartialEq for Unit {
+    fn eq(&self, other: &Self) -> bool {
+        let meaning = |unit: &Self| (unit.dimension, unit.ratio_of(), unit.is_hertz());
+        self.factor == other.factor
+            && self.zero == other.zero
+            && self.parts.bare_weight == other.parts.bare_weight
+            && meaning(self) == meaning(other)
     }
 }
 
