@@ -188,10 +188,28 @@ fn a_doubtful_rate_above_a_table_is_an_assumption() {
         ("Interval: 5", true),
         ("Interval: 5 ms", false),
         ("Interval: 0.0005", false),
+        ("Total sample rate: 4 kHz", true),
+        ("ADC sample rate: 10 kHz\nStorage rate: 2 kHz", true),
+        ("Sample rate: 10 kHz\nDecimation: 5", true),
+        ("Sample rate: 2 kHz\nDecimation: 1", false),
     ] {
         folder.write("in.csv", format!("{header}\nbridge [V]\n{rows}"));
         let report = folder.json(&["inspect", "in.csv", "--json"]);
         let is_said = crate::util::codes(&report).contains(&"time-assumed");
         assert_eq!(is_said, is_assumed, "{header}: {report}");
+    }
+    // Without a colon, the comma is the decimal mark of the interval and not the end of its name.
+    let rows: String = (0..2000)
+        .map(|i| format!("{:.9};0\n", volts(i)).replace('.', ","))
+        .collect();
+    for (header, rate_hz) in [
+        ("Abtastintervall 0,5 ms", None),
+        ("Abtastintervall: 0,5 ms", Some(2000.0)),
+        ("Abtastintervall,0.5 ms", Some(2000.0)),
+    ] {
+        folder.write("in.csv", format!("{header}\nbridge [V];n [rpm]\n{rows}"));
+        let report = folder.json(&["inspect", "in.csv", "--json"]);
+        let found = report["channels"][0]["rate_hz"].as_f64();
+        assert_eq!(found, rate_hz, "{header}");
     }
 }

@@ -43,6 +43,24 @@ impl Sources<'_> {
                 short(other)
             ));
         }
+        if keys::is_of_others(words) {
+            return Some(format!(
+                "{taken}, but may be the rate of all channels together, or before some samples are left out"
+            ));
+        }
+        let mut thinned = self.entries.iter().filter(|e| keys::is_thinning(&e.key));
+        let thinned = thinned.find_map(|entry| {
+            let (count, _) = keys::quantity(entry.value()?, self.decimal)?;
+            (count > 1.0).then_some((entry, count))
+        });
+        if let Some((entry, count)) = thinned {
+            return Some(format!(
+                "{taken}, but \"{}\" in line {} is {}",
+                entry.key,
+                entry.line,
+                short(count)
+            ));
+        }
         let bare = rates.find(|(e, _)| e.key == words && e.topic() == Some(Topic::Interval));
         let (entry, _) =
             bare.filter(|(e, _)| LONG_S * hz <= 1.0 && !keys::has_unit(e, self.decimal))?;

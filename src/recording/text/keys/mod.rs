@@ -5,7 +5,7 @@ mod words;
 
 use crate::recording::text::dialect::{Delimiter, Dialect};
 pub use values::{date_text, has_unit, quantity, rate_hz, seconds};
-pub use words::{is_vague, topic};
+pub use words::{is_of_others, is_thinning, is_vague, topic};
 
 /// A line with a key and values.
 #[derive(Debug, Clone, PartialEq)]
@@ -205,7 +205,8 @@ fn split(text: &str, dialect: Dialect) -> Vec<String> {
     };
     let marks = [table, Some(b'\t'), Some(b';'), Some(b',')];
     for mark in marks.into_iter().flatten() {
-        let is_decimal = table.is_none() && dialect.decimal == mark;
+        let is_decimal = table.is_none() && dialect.decimal == mark
+            || table != Some(mark) && is_within_number(text, mark);
         if text.contains(char::from(mark)) && !is_decimal {
             let delimiter = Delimiter::Byte(mark);
             return Dialect {
@@ -216,6 +217,16 @@ fn split(text: &str, dialect: Dialect) -> Vec<String> {
         }
     }
     vec![text.to_owned()]
+}
+
+/// Whether the first of these marks is in a number behind a word: `Abtastintervall 0,2 ms`.
+fn is_within_number(text: &str, mark: u8) -> bool {
+    let is_digit = |c: char| c.is_ascii_digit();
+    let parts = text.split_once(char::from(mark));
+    parts.is_some_and(|(before, behind)| {
+        let word = before.rsplit_once(' ').map_or("", |(_, word)| word);
+        !word.is_empty() && word.chars().all(is_digit) && behind.starts_with(is_digit)
+    })
 }
 
 #[cfg(test)]

@@ -9,6 +9,23 @@ pub fn is_vague(key: &str) -> bool {
     has("vague keys", without_brackets(&key.to_lowercase()))
 }
 
+/// Whether the rate given by a key may be that of all channels together, or before some samples are left out.
+#[must_use]
+pub fn is_of_others(key: &str) -> bool {
+    contains_any("rates of others", key)
+}
+
+/// Whether a key says how many samples were left out.
+#[must_use]
+pub fn is_thinning(key: &str) -> bool {
+    contains_any("thinning", key)
+}
+
+fn contains_any(section: &str, key: &str) -> bool {
+    let lower = key.to_lowercase();
+    words(section).iter().any(|word| lower.contains(word.text))
+}
+
 /// Topic of a key.
 #[must_use]
 pub fn topic(key: &str) -> Option<Topic> {
