@@ -568,6 +568,36 @@ fn milliseconds_beside_a_clock_of_seconds_are_their_parts() {
         .says(0, &["3000 samples at 1000 Hz"]);
 }
 
+/// One row per value, whose signal another column names or numbers, in turn or by chance.
+#[test]
+fn rows_of_several_signals_are_refused() {
+    let folder = Folder::new();
+    let rows = |name: &dyn Fn(usize) -> &'static str| -> String {
+        let row = |i: usize| format!("{:.4},{},{:.4}\n", 1e-3 * i as f64, name(i), torque(i));
+        (0..1000).map(row).collect()
+    };
+    let in_turn = rows(&|i| ["torque", "speed"][i % 2]);
+    let by_chance = rows(&|i| ["torque", "speed", "temperature"][i * i % 7 % 3]);
+    let numbers = rows(&|i| ["1", "2"][i % 2]);
+    for (heading, rows, is_refused) in [
+        ("Signal", &in_turn, true),
+        ("Signal", &by_chance, true),
+        ("ID", &numbers, true),
+        ("Speed [rpm]", &numbers, false),
+        ("State", &rows(&|i| ["on", "off"][i / 100 % 2]), false),
+    ] {
+        folder.write("in.csv", format!("Time [s],{heading},Torque [Nm]\n{rows}"));
+        let ran = folder.run(&[&COMPENSATE[..], &["--force", "--channel", "Torque"]].concat());
+        match is_refused {
+            true => ran.says(
+                1,
+                &["variables in turn", "keep only the rows of one variable"],
+            ),
+            false => ran.says(0, &["1000 samples at 1000 Hz"]),
+        };
+    }
+}
+
 /// Headings of words between spaces: the unit in brackets belongs to the word before it, and more words than columns name
 /// none of them, instead of the wrong ones.
 #[test]

@@ -3,7 +3,9 @@
 use super::cell::Cell;
 use super::clock::EPOCH_S;
 use super::head::{Head, Table};
+use super::header::Field;
 use super::rows::ColumnKind;
+use super::vocabulary::has;
 use crate::failure::{ErrorCode, Failure};
 use crate::recording::choice::transposed;
 use crate::recording::text::dialect::is_skipped;
@@ -66,32 +68,52 @@ pub fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Rejects a table whose rows name one variable after the other with the same stamps: their values would
-/// be read as one channel.
+/// Rejects a table whose rows name one variable after the other: their values would be read as one channel.
 ///
 /// # Errors
 /// If it is one.
-pub fn refuse_variables(head: &Head, table: &Table, kinds: &[ColumnKind]) -> Result<(), Failure> {
-    let is_text = |place: &usize| kinds[*place] == ColumnKind::Nothing;
-    let is_clock = |place: &usize| matches!(kinds[*place], ColumnKind::Clock(_));
+pub fn refuse_variables(
+    head: &Head,
+    table: &Table,
+    kinds: &[ColumnKind],
+    fields: &[Field],
+) -> Result<(), Failure> {
     let rows = first_cells(head, table);
-    let listed = (0..kinds.len()).filter(is_text).find_map(|place| {
-        let count = cycle(&rows, place)?;
+    let is_number = |place: usize| {
+        let is_filled = rows.first().and_then(|row| row.get(place));
+        matches!(kinds[place], ColumnKind::Numbers | ColumnKind::Offset(_))
+            && is_filled.is_some_and(|cell| !cell.is_empty())
+    };
+    let numbers: Vec<usize> = (0..kinds.len()).filter(|place| is_number(*place)).collect();
+    let is_clock = |place: &usize| matches!(kinds[*place], ColumnKind::Clock(_));
+    let mut places = 0..kinds.len();
+    let listed = places.find_map(|place| {
+        let is_id = has("signal numbers", &fields[place].name.to_lowercase());
+        let (count, is_cycle) = match kinds[place] {
+            // Not numbers with units.
+            ColumnKind::Nothing if is_id || !starts_with_digit(&rows, place) => {
+                variables(&rows, place)?
+            }
+            ColumnKind::Numbers if is_id => variables(&rows, place)?,
+            _ => return None,
+        };
         let same = |time: usize| {
             rows.chunks_exact(count)
                 .all(|cycle| cycle.iter().all(|row| row.get(time) == cycle[0].get(time)))
         };
-        (0..kinds.len())
-            .filter(is_clock)
-            .any(same)
-            .then(|| (count, &rows[0][place]))
+        let is_same_time = || is_cycle && (0..kinds.len()).filter(is_clock).any(same);
+        // One value, and perhaps the time.
+        let of_time = usize::from(!(0..kinds.len()).any(|place| is_clock(&place)));
+        let values = numbers.iter().filter(|number| **number != place).count();
+        ((1..=1 + of_time).contains(&values) || is_same_time()).then_some((count, place))
     });
     match listed {
-        Some((count, first)) => Err(Failure::failed(
+        Some((count, place)) => Err(Failure::failed(
             ErrorCode::NotARecording,
             format_args!(
-                "the rows name {count} variables in turn, first \"{first}\", each with a value at the same time; \
-                 expected a column for each variable: rewrite the file that way"
+                "the rows name {count} variables in turn, first \"{}\" in \"{}\"; expected a column for each variable: \
+                 rewrite the file that way, or keep only the rows of one variable, without that column",
+                rows[0][place], fields[place].heading
             ),
         )
         .line(head.number(table.first))),
@@ -108,15 +130,30 @@ fn begins_with_epoch(rows: &[Vec<Cell>]) -> bool {
     rows.len() > 1 && rows.iter().all(is_epoch)
 }
 
-/// Number of rows after which the texts of a column repeat in the same order, all of them
-/// different.
-fn cycle(rows: &[Vec<String>], place: usize) -> Option<usize> {
+/// Number of variables that the texts of a column name, of which most rows name another one than the row before, and
+/// whether they always come in the same order.
+fn variables(rows: &[Vec<String>], place: usize) -> Option<(usize, bool)> {
     let texts: Vec<&String> = rows.iter().filter_map(|row| row.get(place)).collect();
-    let count = 1 + texts.iter().skip(1).position(|text| *text == texts[0])?;
-    let is_distinct = (1..count).all(|i| !texts[..i].contains(&texts[i]));
-    let comes_again = texts.iter().zip(&texts[count..]).all(|(a, b)| a == b);
-    let is_long = texts.len() == rows.len() && texts.len() >= 3 * count;
-    (count > 1 && is_distinct && comes_again && is_long).then_some(count)
+    let mut names: Vec<&String> = texts.clone();
+    names.sort_unstable();
+    names.dedup();
+    let count = names.len();
+    let changes = texts.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    let is_list = count > 1
+        && texts.len() == rows.len()
+        && texts.len() >= 3 * count
+        && 2 * changes >= texts.len()
+        && !names[0].is_empty();
+    let comes_again = || texts.iter().zip(&texts[count..]).all(|(a, b)| a == b);
+    is_list.then(|| (count, comes_again()))
+}
+
+fn starts_with_digit(rows: &[Vec<String>], place: usize) -> bool {
+    let first = rows.first().and_then(|row| row.get(place));
+    first.is_some_and(|text| {
+        text.trim_start_matches(['-', '+'])
+            .starts_with(|c: char| c.is_ascii_digit())
+    })
 }
 
 /// The cells of the first rows.

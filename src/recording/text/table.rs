@@ -126,7 +126,7 @@ impl Layout {
                 .into_iter()
                 .map(|(kind, text)| (kind.unwrap_or(ColumnKind::Numbers), text))
                 .unzip();
-        listing::refuse_variables(&head, &table, &kinds)?;
+        listing::refuse_variables(&head, &table, &kinds, &header.fields)?;
         if let Some(unit) = hints.unit {
             header.set_default_units(unit);
         }
