@@ -59,7 +59,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
     ("Stand file", &[
         ["residues-do-not-add-up", "the residues of [[modes]] leave much of the static response to modes above the band", "check them: residues are fractions of 1"],
         ["diagnosis-incomplete", "the stand file was written by a diagnosis that did not fully explain its records", "compare it with the previous stand file on a record with a known torque, or diagnose again with other records"],
-        ["scale-in-heading", "the heading of the channel contains a scale factor such as x10, which was not applied", "give the unit with the scale, or rename the column"],
+        ["scale-in-heading", "the heading of the channel contains a scale factor such as x10, or a line above whole numbers gives one; it was not applied", "scale the column and rename it, or remove the line"],
         ["calibration-not-used", "a record in strain was converted with the beam's dimensions although a calibration is given", "record in the unit of the calibration"],
         ["damping-above-one", "the damping ratio is above 1", "write 7 % as 0.07"],
         ["volts-unusual", "most of a record in V exceeds 30 V, more than any bridge amplifier outputs", "give --unit mV if it is in mV"],

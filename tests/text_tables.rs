@@ -598,6 +598,36 @@ fn rows_of_several_signals_are_refused() {
     }
 }
 
+/// A factor above whole numbers may be theirs; numbers with decimals were scaled, and 1 changes nothing.
+#[test]
+fn a_factor_above_whole_numbers_is_said() {
+    let folder = Folder::new();
+    let rows = |decimals: usize| -> String {
+        let row = |i: usize| format!("{:.4};{:.decimals$}\n", 1e-3 * i as f64, 100.0 * torque(i));
+        (0..3000).map(row).collect()
+    };
+    for (factor, decimals, is_said) in [
+        ("ScaleFactor;1;0.01", 0, true),
+        ("Skalierung;1;0.01", 0, true),
+        ("ScaleFactor;1;1", 0, false),
+        ("ScaleFactor;1;0.01", 3, false),
+        ("Vertical Scale;1;0.01", 0, false),
+    ] {
+        let rows = rows(decimals);
+        folder.write(
+            "in.csv",
+            format!("Channel;Time;Torque\nUnit;s;Nm\n{factor}\n\n{rows}"),
+        );
+        let report = folder.json(&["inspect", "in.csv", "--json"]);
+        let codes = crate::util::codes(&report);
+        assert_eq!(
+            codes.contains(&"scale-in-heading"),
+            is_said,
+            "{factor}: {codes:?}"
+        );
+    }
+}
+
 /// Headings of words between spaces: the unit in brackets belongs to the word before it, and more words than columns name
 /// none of them, instead of the wrong ones.
 #[test]

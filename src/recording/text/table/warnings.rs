@@ -2,8 +2,9 @@
 
 use super::Layout;
 use crate::print::plural;
-use crate::recording::text::keys::{Topic, quantity};
+use crate::recording::text::keys::{Entry, Topic, quantity};
 use crate::recording::text::rows::LineNotes;
+use crate::recording::text::vocabulary::has;
 use crate::warning::Warning;
 
 impl Layout {
@@ -15,6 +16,7 @@ impl Layout {
         warnings.extend(self.unassigned_headings());
         warnings.extend(self.axes.warnings.iter().cloned());
         warnings.extend(self.count_differs(rows));
+        warnings.extend(self.unapplied_factor());
         warnings
     }
 
@@ -37,6 +39,38 @@ impl Layout {
              their units as in \"Torque [Nm]\", or separate all cells by tabs or commas"
         );
         Some(Warning::new("unassigned-headings", message))
+    }
+
+    /// A warning if a line above whole numbers gives a factor for them.
+    fn unapplied_factor(&self) -> Option<Warning> {
+        let decimal = self.plan.dialect.decimal;
+        let is_scale = |text: &String| {
+            quantity(text, decimal).is_some_and(|(factor, _)| factor != 1.0 && factor != 0.0)
+        };
+        let is_factor = |entry: &&Entry| {
+            let letters = entry
+                .key
+                .to_lowercase()
+                .replace(|c: char| !c.is_alphabetic(), "");
+            has("factors", &letters) && entry.values.iter().any(is_scale)
+        };
+        let entry = self.header.entries.iter().find(is_factor)?;
+        let are_whole = self.channel_places().any(|place| {
+            let values = &self.first_rows.columns[place].values;
+            !values.is_empty() && values.iter().all(|value| value.fract() == 0.0)
+        });
+        are_whole.then(|| {
+            Warning::new(
+                "scale-in-heading",
+                format!(
+                    "line {} gives a factor, \"{}\" {}, which was not applied to the whole numbers below it; if it should be, \
+                     scale the column and remove that line",
+                    entry.line,
+                    entry.key,
+                    entry.values.join(", ")
+                ),
+            )
+        })
     }
 
     /// A warning if the number of samples in the header differs from the number of rows.
