@@ -598,6 +598,21 @@ fn rows_of_several_signals_are_refused() {
     }
 }
 
+/// Channels without times below each other are not one channel, nor does --fill make them one.
+#[test]
+fn a_heading_among_the_values_of_one_channel_begins_another() {
+    let folder = Folder::new();
+    let values: String = (0..6000).map(|i| format!("{:.4}\n", torque(i))).collect();
+    folder.write(
+        "in.csv",
+        format!("# Sample rate: 1000 Hz\nM (Nm)\n{values}\nn (V)\n{values}"),
+    );
+    for more in [&[][..], &["--fill", "linear"]] {
+        let ran = folder.run(&[&COMPENSATE[..], more].concat());
+        assert_eq!(ran.code, 1, "{}", ran.stderr);
+    }
+}
+
 /// A factor above whole numbers may be theirs; numbers with decimals were scaled, and 1 changes nothing.
 #[test]
 fn a_factor_above_whole_numbers_is_said() {

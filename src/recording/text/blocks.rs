@@ -6,6 +6,7 @@ use super::head::is_end;
 use super::header::Header;
 use super::keys::{self, Entry, Topic};
 use super::rows::{ColumnKind, Rows};
+use super::units;
 use crate::recording::text::dialect::Dialect;
 
 /// Maximum number of blocks under the same headings.
@@ -22,6 +23,8 @@ pub struct TableEnd {
     pub keys: Vec<String>,
     /// Starts of lines that end it.
     pub marks: &'static [&'static str],
+    /// Whether it has a single column, so that any heading with a unit begins another table.
+    pub is_single: bool,
     /// Separation of keys and values.
     pub dialect: Dialect,
 }
@@ -40,6 +43,7 @@ impl TableEnd {
             names: header.names.clone(),
             keys: entries.into_iter().map(|entry| entry.key).collect(),
             marks: &[],
+            is_single: kinds.len() == 1,
             dialect,
         }
     }
@@ -50,6 +54,7 @@ impl TableEnd {
             names: None,
             keys: Vec::new(),
             marks,
+            is_single: false,
             dialect,
         }
     }
@@ -69,6 +74,10 @@ impl TableEnd {
         };
         if names == line {
             return true;
+        }
+        if self.is_single {
+            let is_word = line.starts_with(char::is_alphabetic);
+            return is_word && units::heading(line).unit.is_some();
         }
         let [names, cells] = [names, line].map(|line| self.dialect.cells(line));
         let is_text = |cell: &String| Cell::read(cell, self.dialect.decimal) == Cell::Text;
