@@ -566,6 +566,22 @@ fn milliseconds_beside_a_clock_of_seconds_are_their_parts() {
     folder
         .run(&[&COMPENSATE[..], &["--force"]].concat())
         .says(0, &["3000 samples at 1000 Hz"]);
+    // Microseconds as well, but not milliseconds since the start, which are the time alone.
+    for (heading, first) in [("us", 0.0), ("Elapsed [ms]", 0.0), ("Time (ms)", 0.2)] {
+        let part = |i: usize| match heading {
+            "us" => format!("{}", i % 5000 * 200),
+            _ => format!("{:.1}", first + 0.2 * i as f64),
+        };
+        let row = |i: usize| {
+            let (s, part) = (12 + i / 5000, part(i));
+            format!("2024/03/12 10:11:{s},{part},{:.4}\n", torque(i))
+        };
+        let rows: String = (0..12_000).map(row).collect();
+        folder.write("in.csv", format!("Date&Time,{heading},Torque [Nm]\n{rows}"));
+        folder
+            .run(&[&COMPENSATE[..], &["--force"]].concat())
+            .says(0, &["12000 samples at 5000 Hz"]);
+    }
 }
 
 /// One row per value, whose signal another column names or numbers, in turn or by chance.

@@ -6,7 +6,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::recording::text::clock::{Clock, ClockOrigin, unwrap_midnights};
 use crate::recording::text::rows::{Column, ColumnKind};
 use crate::recording::text::units;
-use crate::recording::text::vocabulary::has;
+use crate::recording::text::vocabulary::{has, meaning};
 use crate::recording::{seconds_assumed, typical_step};
 use crate::unit::{NamedUnit, scale_in};
 use torqcomp_model::Unit;
@@ -159,27 +159,26 @@ impl Sources<'_> {
     }
 
     fn clock_rule(&self, place: usize, first: Clock, group: &Group) -> StampRule {
-        // Seconds in one column, milliseconds in the next.
-        let milliseconds = group
-            .times
-            .iter()
-            .copied()
-            .find(|p| *p == place + 1)
-            .filter(|p| {
-                let values = &self.columns[*p].values;
-                // Within the first second they rise.
-                let of_unit = self.fields[*p].unit.as_ref();
-                let is_named = || of_unit.is_some_and(|unit| unit.unit.factor() == 1e-3);
+        // Seconds in one column, milliseconds or microseconds in the next.
+        let beside = group.times.iter().copied().find(|p| *p == place + 1);
+        let parts = beside
+            .filter(|p| !self.is_clock(*p))
+            .map(|beside| Parts {
+                place: beside,
+                seconds_per_unit: self.own_seconds(beside).unwrap_or(1e-3),
+                whole: 0.0,
+            })
+            .filter(|parts| {
+                let values = &self.columns[parts.place].values;
+                // Within the first second they rise, like milliseconds since the start: `Elapsed [ms]`.
+                let name = self.fields[parts.place].name.to_lowercase();
+                let is_unit = || meaning("time units", &name).is_some();
                 let seconds = &self.columns[place].values;
                 let is_one = || seconds.iter().all(|second| *second == seconds[0]);
-                !self.is_clock(*p)
-                    && values.iter().all(|v| (0.0..1000.0).contains(v))
-                    && (!rises(values) || begin_anew(values, seconds) || is_named() && is_one())
-            })
-            .map(|place| Parts {
-                place,
-                seconds_per_unit: 1e-3,
-                whole: 0.0,
+                let is_part = |v: &f64| (0.0..1.0).contains(&(v * parts.seconds_per_unit));
+                parts.seconds_per_unit < 1e-2
+                    && values.iter().all(is_part)
+                    && (!rises(values) || begin_anew(values, seconds) || is_unit() && is_one())
             });
         let text = self.clock_texts[place].clone().unwrap_or_default();
         let date = group
@@ -190,7 +189,7 @@ impl Sources<'_> {
         StampRule {
             is_time_of_day: first.day.is_none(),
             clock: Some(first.as_origin()),
-            parts: milliseconds,
+            parts,
             start_text: Some(match date.filter(|_| first.day.is_none()) {
                 Some(date) => format!("{date} {text}"),
                 None => text,
