@@ -86,7 +86,7 @@ fn recorder_and_delay_come_out_as_well() {
     )
     .unwrap();
     let chain = move |f: f64| forward(f) * recorder.response(f);
-    let measured = multisine(rate, 20_000, &chain);
+    let measured = multisine(rate, 20_000, chain);
     let band = Band::new(rate, 2400.0).unwrap();
     let filter = InverseFilter::design(Arc::new(move |f| chain(f).inv()), band).unwrap();
     let truth = multisine(rate, 20_000, |_| Complex64::ONE);
