@@ -9,7 +9,7 @@ use super::SearchState;
 use super::acceptance::refusal;
 use super::applied_noise::AppliedNoise;
 use super::decide::NEARLY;
-use super::fit::{FitEffort, fit};
+use super::fit::{FitEffort, FittedModel, fit};
 use super::pairs::best_pairs;
 use super::records::Records;
 use super::score::{BaseModel, ScoredModel};
@@ -165,8 +165,7 @@ impl SearchState {
         if !self.settled || !self.is_worthwhile(&self.after, &self.tests) {
             return false;
         }
-        let fitted = &self.after.fitted;
-        let starts = from_other_starts(&fitted.structure, &fitted.values);
+        let starts = from_other_starts(&self.after.fitted);
         let best = self.best_from(&starts, workers, |model| {
             model.criterion() < self.after.criterion() - SAME
         });
@@ -218,26 +217,32 @@ impl SearchState {
     }
 }
 
-/// The structure with the start values of its forms for one of the added effects, except for their sizes.
-fn from_other_starts(structure: &Structure, values: &[f64]) -> Vec<(Structure, Vec<f64>)> {
+/// The model with the start values of its form, except for the size, for one of the added effects: one with a parameter at
+/// a bound, or that may lie on either side of zero.
+fn from_other_starts(fitted: &FittedModel) -> Vec<(Structure, Vec<f64>)> {
+    let structure = &fitted.structure;
     let mut next = structure.context.plain_count();
     let mut starts: Vec<(Structure, Vec<f64>)> = Vec::new();
     for (k, effect) in structure.effects.iter().enumerate() {
-        let from = next;
-        next += effect.moved();
-        if k < structure.declared || effect.is_line() {
+        let own = next..next + effect.moved();
+        next = own.end;
+        let of_form = effect.form.starts;
+        let shape = (0..effect.moved()).filter(|i| Some(*i) != effect.size());
+        let has_sides = |i: usize| of_form.iter().any(|s| s[i] < 0.0);
+        let is_stuck = fitted.std[own.clone()].iter().any(Option::is_none);
+        let is_doubtful = is_stuck || shape.clone().any(has_sides);
+        if k < structure.declared || effect.is_line() || !is_doubtful {
             continue;
         }
-        for start in effect.form.starts {
-            let mut values = values.to_vec();
-            let shape = (0..effect.moved()).filter(|i| Some(*i) != effect.size());
-            shape.for_each(|i| values[from + i] = start[i]);
+        for start in of_form {
+            let mut values = fitted.values.clone();
+            let moved = shape.clone();
+            moved.for_each(|i| values[own.start + i] = start[i]);
             if starts.iter().all(|(_, other)| *other != values) {
                 starts.push((structure.clone(), values));
             }
         }
     }
-    starts.retain(|(_, start)| start != values);
     starts
 }
 
