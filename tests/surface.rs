@@ -119,6 +119,43 @@ fn damping_in_one_direction_is_drawn() {
     assert!(apart < 4.0, "{apart} {points:?}");
 }
 
+/// A spot that rubs more the farther the stand is from it, beside a line: the spot is where it is, not on the other side.
+#[test]
+fn a_rubbing_spot_is_on_its_side() {
+    let wedge: Law = |x, v| 0.03 * (x + 0.6).abs() * (4.0 * v).tanh();
+    let folder = Folder::new();
+    let _ = diagnosed(wedge, &folder, &[]);
+    let line = |row: usize| 0.02 * (TAU * 33.3 * row as f64 / RATE_HZ).sin();
+    for name in ["train.csv", "holdout.csv"] {
+        let text = folder.read(name);
+        let mut rows = text.lines();
+        let head = rows.next().expect("a heading").to_owned();
+        let with_line = rows.enumerate().map(|(row, text)| {
+            let (before, seen) = text.rsplit_once(',').expect("a number");
+            let seen: f64 = seen.parse().expect("a number");
+            format!("{before},{:.9}", seen + line(row))
+        });
+        let all: Vec<String> = std::iter::once(head).chain(with_line).collect();
+        folder.write(name, all.join("\n") + "\n");
+    }
+    let report = report(&folder, &[]);
+    println!(
+        "{} {} {}",
+        report["verdict"], report["effects"], report["candidates"]
+    );
+    assert_eq!(report["verdict"], "explained");
+    let candidates = report["candidates"].as_array().expect("a list").iter();
+    let mut named = candidates.filter(|c| c["effect"] == "position-dependent-friction");
+    let spot = named
+        .find(|c| c["status"] == "accepted")
+        .expect("it is named");
+    let mut parameters = spot["parameters"].as_array().expect("a list").iter();
+    let centre = parameters.find(|p| p["name"] == "centre");
+    let centre = centre.expect("a centre");
+    let off = number(&centre["value"]) + 0.6;
+    assert!(off.abs() < 4.0 * number(&centre["std"]), "{centre}");
+}
+
 /// Position-dependent friction is neither dry friction nor nothing; if it grows with the displacement, it has a name.
 #[test]
 fn friction_that_depends_on_the_place_is_no_dry_friction() {

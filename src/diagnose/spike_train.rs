@@ -177,6 +177,25 @@ mod tests {
     use super::*;
     use crate::diagnose::test_noise::noise;
 
+    /// Two records of 12 spikes each.
+    #[test]
+    fn a_train_of_few_spikes_has_its_own_rate() {
+        let mut random = noise(5);
+        let mut with = |first: f64| -> Vec<f64> {
+            let since = |i: usize| (i as f64 - first).rem_euclid(198.15);
+            (0..2460)
+                .map(|i| 6.0 * (-since(i) / 5.0).exp() + random())
+                .collect()
+        };
+        let residuals = [40.3, 117.8].map(|first| {
+            let mut input = noise(first as u64);
+            let input = (0..2460).map(|_| input()).collect();
+            RecordResidual::made(input, vec![0.0; 2460], with(first))
+        });
+        let rate_hz = train_rate_hz(&residuals).expect("a train");
+        assert!((rate_hz * 198.15e-3 - 1.0).abs() < 1e-3, "{rate_hz}");
+    }
+
     #[test]
     fn a_train_is_told_from_single_spikes() {
         let mut random = noise(5);

@@ -447,6 +447,19 @@ mod tests {
         }
     }
 
+    /// In records of 12.6 spikes, 25 places at twice the rate: the typical one, the median, is full or empty by chance.
+    #[test]
+    fn at_twice_the_rate_every_other_place_is_empty() {
+        let mut random = noise(4);
+        let own = train(2500, (40.3, 198.15), (20.0, 5.0));
+        let samples: Vec<f64> = own.iter().map(|s| s + random()).collect();
+        for (period, is_train) in [(198.15, true), (99.075, false)] {
+            let search = SpikeSearch::of(&samples, period);
+            let found = find_trains(&[search], period, 2500).unwrap().pop().unwrap();
+            assert_eq!(found.share() > 0.0, is_train, "{period}");
+        }
+    }
+
     #[test]
     fn spikes_are_subtracted_and_the_signal_stays() {
         // Lines up to 1.5 kHz at 20 kHz that are 100 times the noise.
