@@ -1,8 +1,8 @@
 //! The chain from the applied torque to the record, link by link, in both directions.
 //!
 //! ```text
-//! torque ─► stand, with its torques ─► dynamics ─► gage ─► recorder and chain ─► limit ─► record
-//!                                                                   disturbances ─┘
+//! torque ─► stand, with its torques ─► dynamics ─► gage ─► recorder and chain ─► limit ─(+)─► record
+//!                                                                         disturbances ─┘
 //! ```
 //!
 //! Forward: [`Chain::simulate`]. The inverse takes the links in reverse order, those of one of the [`Chain::groups`]
