@@ -886,6 +886,17 @@ fn a_rate_from_stamps_has_an_uncertainty() {
     );
     let given = [&harmonics("even.csv")[..], &["--rate", "2000"]].concat();
     assert!(folder.json(&given)["rate_std_hz"].is_null());
+    // A rate from header or user has no uncertainty by the stamps.
+    folder.write(
+        "header.csv",
+        format!("Sample rate;2000 Hz\n{}", table(2000.0, 0.0)),
+    );
+    for more in [&["header.csv"][..], &["even.csv", "--rate", "2000"]] {
+        let inspected = folder.json(&[&["inspect", "--json"], more].concat());
+        let channel = &inspected["channels"][0];
+        assert!(channel["rate_std_hz"].is_null(), "{channel}");
+        assert_eq!(channel["rate_hz"], 2000.0);
+    }
     let inspected = folder.json(&["inspect", "uneven.csv", "--json"]);
     let stated = inspected["channels"][0]["rate_std_hz"].as_f64().unwrap();
     // A uniform jitter of ± 50 µs has a standard deviation of 29 µs: √2 of it over 1 s, of 2000 Hz.

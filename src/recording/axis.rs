@@ -322,6 +322,20 @@ fn line_of(stamps_s: &[f64], origin_s: f64) -> Option<Rounded> {
 }
 
 impl TimeAxis {
+    /// Takes a rate that does not come from its stamps.
+    pub(crate) fn set_rate(&mut self, rate_hz: f64, from: RateFrom) {
+        self.rate_hz = Some(rate_hz);
+        self.rate_std_hz = None;
+        self.rate_from = from;
+    }
+
+    /// Takes the rate given by the user, if any.
+    pub(crate) fn prefer_given(&mut self, rate_hz: Option<f64>) {
+        if let Some(rate_hz) = rate_hz {
+            self.set_rate(rate_hz, RateFrom::Given);
+        }
+    }
+
     /// An axis of stamps in seconds.
     #[must_use]
     pub fn of_stamps(heading: &str, stamps_s: Arc<Vec<f64>>) -> Self {

@@ -202,20 +202,19 @@ fn axis_of_stamps(
     later: &[f64],
     reading: &Reading,
 ) -> Result<TimeAxis, Failure> {
-    let found = TimeAxis::of_stream(
+    let mut axis = TimeAxis::of_stream(
         &stamps.heading,
         grid_of(stamps),
         &stamps.first,
         later,
         reading,
     )?;
-    Ok(match &of_first_rows.rate_from {
-        RateFrom::Header(_) if !reading.resample => TimeAxis {
-            rate_hz: of_first_rows.rate_hz,
-            rate_std_hz: None,
-            rate_from: of_first_rows.rate_from.clone(),
-            ..found
-        },
-        _ => found,
-    })
+    let header = matches!(of_first_rows.rate_from, RateFrom::Header(_));
+    if let Some(rate_hz) = of_first_rows
+        .rate_hz
+        .filter(|_| header && !reading.resample)
+    {
+        axis.set_rate(rate_hz, of_first_rows.rate_from.clone());
+    }
+    Ok(axis)
 }

@@ -118,10 +118,7 @@ impl AxisRule {
         if axis.start_text.is_none() {
             axis.start_text = axis.start.and_then(Moment::date);
         }
-        if let Some(rate_hz) = self.given_hz {
-            axis.rate_hz = Some(rate_hz);
-            axis.rate_from = RateFrom::Given;
-        }
+        axis.prefer_given(self.given_hz);
         axis
     }
 
@@ -144,8 +141,7 @@ impl AxisRule {
                 ahead_s <= QUANTA * line.quantum_s
             });
         if coarse && difference < SAME || difference < ROUNDED || is_rounding {
-            axis.rate_hz = Some(*hz);
-            axis.rate_from = RateFrom::Header(words.clone());
+            axis.set_rate(*hz, RateFrom::Header(words.clone()));
         }
     }
 }

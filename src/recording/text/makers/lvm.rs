@@ -17,7 +17,7 @@ use crate::recording::text::header::Field;
 use crate::recording::text::rows::{self, Column};
 use crate::recording::text::table::channel;
 use crate::recording::without_rounding;
-use crate::recording::{Channel, RateFrom, Recording, Segment, TimeAxis};
+use crate::recording::{Channel, Recording, Segment, TimeAxis};
 use crate::warning::Warning;
 
 const END: &str = "***End_of_Header***";
@@ -347,10 +347,7 @@ fn axis(file: &File, header: &Header, place: usize, times: &Column, reading: &Re
     axis.header_rate_hz = header_hz.filter(|_| is_time);
     axis.start_text = joined(&header.dates, &header.times, place)
         .or_else(|| joined(&header.dates, &header.times, 0));
-    if let Some(rate_hz) = reading.rate_hz {
-        axis.rate_hz = Some(rate_hz);
-        axis.rate_from = RateFrom::Given;
-    }
+    axis.prefer_given(reading.rate_hz);
     axis
 }
 

@@ -14,7 +14,7 @@ use crate::recording::text::head::Head;
 use crate::recording::text::header::Field;
 use crate::recording::text::rows;
 use crate::recording::text::table::channel;
-use crate::recording::{RateFrom, Recording, TimeAxis};
+use crate::recording::{Recording, TimeAxis};
 use crate::warning::Warning;
 
 const DIALECT: Dialect = Dialect {
@@ -96,10 +96,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
         1.0 / start.step_s,
         Some(-start.trigger * start.step_s),
     );
-    if let Some(rate_hz) = reading.rate_hz {
-        axis.rate_hz = Some(rate_hz);
-        axis.rate_from = RateFrom::Given;
-    }
+    axis.prefer_given(reading.rate_hz);
     recording
         .channels
         .push(channel(&Field::new("signal", None), column, axis));

@@ -15,7 +15,7 @@ use crate::recording::text::header::Field;
 use crate::recording::text::rows;
 use crate::recording::text::table::channel;
 use crate::recording::without_rounding;
-use crate::recording::{RateFrom, Recording, TimeAxis};
+use crate::recording::{Recording, TimeAxis};
 
 const DIALECT: Dialect = Dialect {
     delimiter: Delimiter::Byte(b','),
@@ -84,10 +84,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
         without_rounding(1.0 / start.step_s),
         Some(start.start_s),
     );
-    if let Some(rate_hz) = reading.rate_hz {
-        axis.rate_hz = Some(rate_hz);
-        axis.rate_from = RateFrom::Given;
-    }
+    axis.prefer_given(reading.rate_hz);
     // Bare values have no index column.
     let counts = start
         .names

@@ -17,7 +17,7 @@ use crate::recording::text::keys::{self, Entry, Topic};
 use crate::recording::text::rows;
 use crate::recording::text::table::channel;
 use crate::recording::text::{FOR_MAKER, details, units};
-use crate::recording::{RateFrom, Recording, TimeAxis};
+use crate::recording::{Recording, TimeAxis};
 use crate::warning::Warning;
 
 /// The rules.
@@ -148,9 +148,6 @@ fn axis(entries: &[Entry], stamps: Vec<f64>, reading: &Reading) -> TimeAxis {
         .iter()
         .find_map(|entry| keys::rate_hz(entry, None, b'.'));
     axis.start_text = keys::date_text(entries);
-    if let Some(rate_hz) = reading.rate_hz {
-        axis.rate_hz = Some(rate_hz);
-        axis.rate_from = RateFrom::Given;
-    }
+    axis.prefer_given(reading.rate_hz);
     axis
 }
