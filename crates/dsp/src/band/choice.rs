@@ -60,14 +60,6 @@ pub struct BandChoice {
     pub lost_rms: f64,
 }
 
-impl BandChoice {
-    /// Expected RMS error of the compensated record.
-    #[must_use]
-    pub fn error_rms(&self) -> f64 {
-        self.noise_rms.hypot(self.lost_rms)
-    }
-}
-
 /// Spectrum of a record and the inverse response of a stand.
 #[derive(Debug, Clone)]
 pub struct BandSearch {

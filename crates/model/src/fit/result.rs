@@ -59,14 +59,6 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Residual standard deviation s = √(sum of squares / degrees of freedom); `None` for zero
-    /// degrees of freedom.
-    #[must_use]
-    pub fn residual_std(&self) -> Option<f64> {
-        (self.degrees_of_freedom > 0)
-            .then(|| (self.sum_of_squares / self.degrees_of_freedom as f64).sqrt())
-    }
-
     /// The parameters with their covariance, for error propagation.
     #[must_use]
     pub fn estimates(&self) -> Estimates {

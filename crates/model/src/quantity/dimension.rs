@@ -33,11 +33,6 @@ impl Dimension {
         Self(exponents)
     }
 
-    /// Exponents of kg, m, s, A, K and rad, in this order.
-    pub const fn exponents(&self) -> [i32; 6] {
-        self.0
-    }
-
     /// Dimension of a product: adds the exponents.
     pub(super) fn times(self, other: Self) -> Self {
         Self(std::array::from_fn(|i| self.0[i] + other.0[i]))
