@@ -47,6 +47,7 @@ mod noise;
 mod once;
 mod one_mode;
 mod output;
+mod own_clocks;
 mod packed;
 mod pages;
 mod predict;

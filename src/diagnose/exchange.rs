@@ -153,10 +153,7 @@ impl SearchState {
             true => self.without_gain(workers),
             false => self.with_gain(workers),
         };
-        if let Some(best) = &best {
-            self.take(best, coarse);
-        }
-        best.is_some()
+        self.take_any(best.as_ref(), coarse)
     }
 
     /// Refits the model from other starts of its effects while something is left, and returns whether that explains more:
@@ -169,10 +166,15 @@ impl SearchState {
         let best = self.best_from(&starts, workers, |model| {
             model.criterion() < self.after.criterion() - SAME
         });
-        if let Some(best) = &best {
-            self.take(best, coarse);
+        self.take_any(best.as_ref(), coarse)
+    }
+
+    /// Adopts a model, if there is one, and returns whether there is.
+    fn take_any(&mut self, better: Option<&ScoredModel>, coarse: usize) -> bool {
+        if let Some(better) = better {
+            self.take(better, coarse);
         }
-        best.is_some()
+        better.is_some()
     }
 
     /// The best model with a gain error and another form of an effect, if it is better.
@@ -221,13 +223,10 @@ impl SearchState {
 /// a bound, or that may lie on either side of zero.
 fn from_other_starts(fitted: &FittedModel) -> Vec<(Structure, Vec<f64>)> {
     let structure = &fitted.structure;
-    let mut next = structure.context.plain_count();
     let mut starts: Vec<(Structure, Vec<f64>)> = Vec::new();
-    for (k, effect) in structure.effects.iter().enumerate() {
-        let own = next..next + effect.moved();
-        next = own.end;
+    for (k, (effect, own)) in structure.placed().enumerate() {
         let of_form = effect.form.starts;
-        let shape = (0..effect.moved()).filter(|i| Some(*i) != effect.size());
+        let shape = (0..own.len()).filter(|i| Some(*i) != effect.size());
         let has_sides = |i: usize| of_form.iter().any(|s| s[i] < 0.0);
         let is_stuck = fitted.std[own.clone()].iter().any(Option::is_none);
         let is_doubtful = is_stuck || shape.clone().any(has_sides);
@@ -253,11 +252,8 @@ fn in_other_stand_forms(structure: &Structure, values: &[f64]) -> Vec<(Structure
         1.0 + chain.added_stiffness()
     };
     let present = stiffness(structure, values);
-    let mut next = structure.context.plain_count();
     let mut starts = Vec::new();
-    for (k, effect) in structure.effects.iter().enumerate() {
-        let own = next..next + effect.moved();
-        next = own.end;
+    for (k, (effect, own)) in structure.placed().enumerate() {
         if k < structure.declared || effect.form.stage != Stage::Stand {
             continue;
         }

@@ -59,11 +59,8 @@ impl ScoredModel {
 impl FittedModel {
     /// The model with one of its effects in a form with a subset of its parameters.
     fn plainer_forms(&self) -> Vec<(Structure, Vec<f64>)> {
-        let mut next = self.structure.context.plain_count();
         let mut found = Vec::new();
-        for (k, present) in self.structure.effects.iter().enumerate() {
-            let own = next..next + present.moved();
-            next = own.end;
+        for (k, (present, own)) in self.structure.placed().enumerate() {
             let value = |name: &str| {
                 let mut parameters = present.form.parameters[..own.len()].iter();
                 let place = parameters.position(|p| p.name == name)?;

@@ -208,10 +208,8 @@ fn parameters(structure: &Structure, start: &[f64]) -> Vec<Parameter> {
 
 /// Index of the rate of a train of spikes.
 fn rate_of_spikes(structure: &Structure) -> Option<usize> {
-    let effects = structure.effects.iter();
-    let train = effects.clone().position(EffectForm::is_train)?;
-    let before: usize = effects.take(train).map(EffectForm::moved).sum();
-    Some(structure.context.plain_count() + before)
+    let train = structure.placed().find(|(effect, _)| effect.is_train());
+    train.map(|(_, own)| own.start)
 }
 
 /// Standard uncertainties with that of the rate of spikes: over the longest record, the sum of their intervals is known

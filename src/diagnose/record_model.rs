@@ -140,8 +140,7 @@ impl RecordModel {
             true => self.shown_at_start(record),
             false => self.shown_at_first(record, own.as_ref()),
         };
-        let others = [Some(InitialState::default()), shown];
-        let others = others.into_iter().flatten();
+        let others = [Some(InitialState::default()), shown].into_iter().flatten();
         let others = others.filter(|initial| *initial != record.initial);
         let others = others.filter_map(from);
         let found = own

@@ -1,6 +1,7 @@
 //! Models with their errors on the records used for comparison: the training records during selection, the held-out
 //! ones in the report.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use schemars::JsonSchema;
@@ -302,31 +303,30 @@ impl ScoredModel {
     pub fn parameters(&self) -> Vec<Vec<EffectParameter>> {
         let fitted = &self.fitted;
         let context = &fitted.structure.context;
-        let mut next = context.plain_count();
         let mut amplitudes = fitted.amplitudes.iter();
-        let effects = fitted.structure.effects.iter();
+        let effects = fitted.structure.placed();
         let values = fitted.structure.effect_values(&fitted.values);
-        let of_effect = |(effect, mut values): (&EffectForm, Vec<f64>)| {
-            let moved = effect.moved();
-            for (value, amplitude) in values[moved..].iter_mut().zip(&mut amplitudes) {
-                *value = *amplitude;
-            }
-            let own = effect.form.parameters.iter().zip(values).enumerate();
-            let own = own.map(|(k, (parameter, value))| {
-                let std = fitted.std.get(next + k).copied().flatten();
-                let std = std.filter(|_| k < moved);
-                let std = std.map(|s| parameter.std(fitted.values[next + k], s, &context.scales));
-                let unit = parameter.unit.text(&context.units.diagnosed);
-                EffectParameter {
-                    effect: effect.effect.name,
-                    name: parameter.name,
-                    estimate: Estimate::of(unit, value, std),
+        let of_effect =
+            |((effect, places), mut values): ((&EffectForm, Range<usize>), Vec<f64>)| {
+                let (from, moved) = (places.start, places.len());
+                for (value, amplitude) in values[moved..].iter_mut().zip(&mut amplitudes) {
+                    *value = *amplitude;
                 }
-            });
-            let own = own.collect();
-            next += moved;
-            own
-        };
+                let own = effect.form.parameters.iter().zip(values).enumerate();
+                let own = own.map(|(k, (parameter, value))| {
+                    let std = fitted.std.get(from + k).copied().flatten();
+                    let std = std.filter(|_| k < moved);
+                    let std =
+                        std.map(|s| parameter.std(fitted.values[from + k], s, &context.scales));
+                    let unit = parameter.unit.text(&context.units.diagnosed);
+                    EffectParameter {
+                        effect: effect.effect.name,
+                        name: parameter.name,
+                        estimate: Estimate::of(unit, value, std),
+                    }
+                });
+                own.collect()
+            };
         effects.zip(values).map(of_effect).collect()
     }
 

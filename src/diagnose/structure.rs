@@ -1,6 +1,7 @@
 //! A model with free parameters: the plain stand and its added effects.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 use std::sync::Arc;
 
 use torqcomp_model::effects::{Action, Effect, Fixed, Form, History, RecordScales, Stage, Unit};
@@ -264,14 +265,11 @@ impl Structure {
 
     /// The same with a selection of its effects, by index, and the corresponding parameter values.
     pub fn reduced(&self, values: &[f64], keeps: impl Fn(usize) -> bool) -> (Self, Vec<f64>) {
-        let (plain, mut rest) = values.split_at(self.context.plain_count());
-        let mut kept = plain.to_vec();
+        let mut kept = values[..self.context.plain_count()].to_vec();
         let mut reduced = Self::plain(self.context.clone());
-        for (k, effect) in self.effects.iter().enumerate() {
-            let (own, others) = rest.split_at(effect.moved());
-            rest = others;
+        for (k, (effect, own)) in self.placed().enumerate() {
             if keeps(k) {
-                kept.extend(own);
+                kept.extend(&values[own]);
                 reduced.effects.push(*effect);
                 reduced.declared += usize::from(k < self.declared);
             }
@@ -319,20 +317,27 @@ impl Structure {
         }
     }
 
+    /// Each effect with the places of its own values among those of the model.
+    pub fn placed(&self) -> impl Iterator<Item = (&EffectForm, Range<usize>)> {
+        let mut next = self.context.plain_count();
+        self.effects.iter().map(move |effect| {
+            let from = next;
+            next += effect.moved();
+            (effect, from..next)
+        })
+    }
+
     /// Values of each effect's own parameters in units of the record, s and Hz; amplitudes of lines are zero.
     pub fn effect_values(&self, values: &[f64]) -> Vec<Vec<f64>> {
-        let mut rest = &values[self.context.plain_count()..];
-        let of_effect = |effect: &EffectForm| {
-            let (own, others) = rest.split_at(effect.moved());
-            rest = others;
-            let fitted = effect.form.parameters.iter().zip(own);
+        let of_effect = |(effect, own): (&EffectForm, Range<usize>)| {
+            let fitted = effect.form.parameters.iter().zip(&values[own]);
             let mut own: Vec<f64> = fitted
                 .map(|(p, value)| p.value(*value, &self.context.scales))
                 .collect();
             own.resize(effect.form.parameters.len(), 0.0);
             own
         };
-        self.effects.iter().map(of_effect).collect()
+        self.placed().map(of_effect).collect()
     }
 
     /// The model for parameter values, and its nuisance terms.

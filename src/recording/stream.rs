@@ -209,12 +209,12 @@ fn axis_of_stamps(
         later,
         reading,
     )?;
-    let header = matches!(of_first_rows.rate_from, RateFrom::Header(_));
-    if let Some(rate_hz) = of_first_rows
-        .rate_hz
-        .filter(|_| header && !reading.resample)
-    {
-        axis.set_rate(rate_hz, of_first_rows.rate_from.clone());
+    if let (from @ RateFrom::Header(_), Some(rate_hz), false) = (
+        &of_first_rows.rate_from,
+        of_first_rows.rate_hz,
+        reading.resample,
+    ) {
+        axis.set_rate(rate_hz, from.clone());
     }
     Ok(axis)
 }

@@ -48,15 +48,7 @@ pub fn text(path: &Path) -> Result<(String, String), Failure> {
 /// As for [`read`].
 pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
     let source = SourceText { name, text };
-    let document = Document::parse(text).map_err(|error| {
-        let message = error.message().replace('\n', ", ");
-        let hint = if text.contains(SCHEMA) {
-            ""
-        } else {
-            "; this does not look like a stand file, which starts with schema = \"torqcomp.stand/1\""
-        };
-        source.at(error.span().map(|span| span.start), format_args!("{message}{hint}"))
-    })?;
+    let document = document(&source)?;
     let top = Section::new(&source, "", document.as_table(), Some(0));
     check_schema(&top)?;
     let nothing = Table::new();
@@ -92,6 +84,18 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
     Ok(stand)
 }
 
+fn document<'a>(source: &SourceText<'a>) -> Result<Document<&'a str>, Failure> {
+    Document::parse(source.text).map_err(|error| {
+        let message = error.message().replace('\n', ", ");
+        let hint = if source.text.contains(SCHEMA) {
+            ""
+        } else {
+            "; this does not look like a stand file, which starts with schema = \"torqcomp.stand/1\""
+        };
+        source.at(error.span().map(|span| span.start), format_args!("{message}{hint}"))
+    })
+}
+
 /// A section of a possibly incomplete stand file.
 fn section_of<T>(
     (name, text): (&str, &str),
@@ -99,8 +103,7 @@ fn section_of<T>(
     read: impl Fn(&Section) -> Result<T, Failure>,
 ) -> Result<Option<T>, Failure> {
     let source = SourceText { name, text };
-    let document = Document::parse(text)
-        .map_err(|error| source.at(error.span().map(|span| span.start), error.message()))?;
+    let document = document(&source)?;
     one(
         &Section::new(&source, "", document.as_table(), Some(0)),
         key,

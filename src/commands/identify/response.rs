@@ -60,10 +60,13 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
     };
     let mut entries = match result.shares.take() {
         Some(shares) => written.entries(&shares, &args.findings)?,
-        None => entries(args, rad_per_n_m(args, &loaded, motion)?, &mut result)?,
+        None => {
+            let size = rad_per_n_m(args, &loaded, motion)?;
+            entries(args, size, &source, &mut result)?
+        }
     };
     entries.extend(recorder(&mut result, &source));
-    entries.extend(calibration(args, units, stand.as_ref(), &mut result)?);
+    entries.extend(calibration(units, stand.as_ref(), &source, &mut result)?);
     deliver(result, recorded, &args.findings, &entries)
 }
 
@@ -183,9 +186,9 @@ fn to_torque(force: &mut Channel, radius_m: f64) -> Result<(), Failure> {
 
 /// Calibration of a signal by a known torque: static torque over signal, for a stand file without calibration.
 fn calibration(
-    args: &Response,
     units: [Option<&NamedUnit>; 2],
     stand: Option<&(String, String)>,
+    source: &str,
     result: &mut Identification,
 ) -> Result<Vec<Entry>, Failure> {
     let [Some(measured), Some(applied)] = units else {
@@ -209,8 +212,7 @@ fn calibration(
         name: key.to_owned(),
         estimate: Estimate::of(unit, value, std),
     };
-    let source = format!("identify response: {}", file_name::list(&args.inputs));
-    let written = entry("calibration", key, &constant, &source);
+    let written = entry("calibration", key, &constant, source);
     result.parameters.push(constant);
     if let Some((name, text)) = stand {
         let declared = stand::calibration_of(name, text)?;
@@ -288,6 +290,7 @@ fn rad_per_n_m(
 fn entries(
     args: &Response,
     rad_per_n_m: Option<f64>,
+    source: &str,
     result: &mut Identification,
 ) -> Result<Vec<Entry>, Failure> {
     let mode = match &result.modes[..] {
@@ -297,15 +300,14 @@ fn entries(
         }
         _ => return Ok(Vec::new()),
     };
-    let source = format!("identify response: {}", file_name::list(&args.inputs));
     match rad_per_n_m {
         Some(size) => {
             let mode = mode.scaled(size);
-            from_residue(&args.anchors, &args.findings, &mode, &source, result)
+            from_residue(&args.anchors, &args.findings, &mode, source, result)
         }
         None => {
             let mode = (&mode, Ratios::OverStiffness);
-            from_ratios(&args.anchors, &args.findings, mode, &source, result)
+            from_ratios(&args.anchors, &args.findings, mode, source, result)
         }
     }
 }
