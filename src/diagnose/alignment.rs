@@ -14,7 +14,7 @@ use super::records::Records;
 use super::refuse::relative_error;
 use super::residual_tests::without_mean;
 use super::score::ScoredModel;
-use super::structure::{FitContext, PlainStand, Structure};
+use super::structure::{FitContext, LateStand, PlainStand, Structure};
 use torqcomp_dsp::dot;
 
 /// Number of parts of a record with a separate estimate of the shift.
@@ -93,6 +93,15 @@ impl Alignment {
             shift,
             context,
             errors: [as_given, error],
+        })
+    }
+
+    /// The stand and its delay, if the measured channel is late by a constant time.
+    pub fn late(&self) -> Option<LateStand> {
+        let is_late = self.shift.late_s > 0.0 && self.shift.per_s == 0.0;
+        is_late.then_some(LateStand {
+            stand: self.context.plain,
+            delay_s: self.shift.late_s,
         })
     }
 

@@ -208,7 +208,10 @@ pub fn next_experiment(
     }
     let follows = found.tests.dependence().map(|share| share.of);
     if let Some(of) = follows.filter(|of| *of != FROM_INPUT) {
-        return Some(shows_torque(of.contains("displacement")).to_owned());
+        return Some(match of.contains("input") {
+            true => PICKED_UP.to_owned(),
+            false => shows_torque(of.contains("displacement")).to_owned(),
+        });
     }
     let fitted = found.rounds.last()?.iter().filter(|c| c.model.is_some());
     let error = |c: &CandidateFit| c.train_rms.unwrap_or(f64::INFINITY);
@@ -218,6 +221,10 @@ pub fn next_experiment(
 
 /// The next record after the stand has changed.
 const AFTER_A_CHANGE: &str = "check clamps, bolts and anything else that may have moved at that moment, then repeat the record";
+
+/// A record without the stand's response.
+const PICKED_UP: &str = "the same input at half the level, and with the bridge unexcited or the stand decoupled: what is left then \
+     does not come from the motion";
 
 /// Records that show a torque as a function of displacement, or of speed.
 pub fn shows_torque(over_displacement: bool) -> &'static str {

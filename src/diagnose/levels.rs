@@ -3,7 +3,7 @@
 use super::fit::RecordResidual;
 use super::residual_tests::without_mean;
 use super::score::ScoredModel;
-use torqcomp_dsp::dot;
+use torqcomp_dsp::{dot, sort_by_number};
 
 /// Minimum ratio of the powers of the motion, and of the residual.
 const LEVELS: f64 = 1.5;
@@ -21,19 +21,28 @@ struct RecordPower {
 }
 
 impl ScoredModel {
-    /// Whether the residual of the training records differs from that of the held-out ones in the direction in which
-    /// their motions differ, by more than noise of its spectrum does.
+    /// Whether the residual of the records with the larger motion exceeds that of the others, training and held-out ones
+    /// alike, by more than noise of its spectrum does.
     pub fn grows_with_level(&self) -> bool {
-        let Some([train, held]) = RecordPower::of(&self.train())
-            .zip(RecordPower::of(&self.compared()))
-            .map(<[RecordPower; 2]>::from)
+        let mut records = [&*self.train(), &*self.compared()].concat();
+        let motion = |r: &RecordResidual| {
+            let x = without_mean(&r.modelled);
+            dot(&x, &x) / x.len() as f64
+        };
+        sort_by_number(&mut records, motion);
+        let (Some(least), Some(most)) = (records.first().map(motion), records.last().map(motion))
         else {
             return false;
         };
-        let level = (train.motion / held.motion).ln();
-        let growth = (train.residual / held.residual).ln() * level.signum();
-        let std = train.scatter.hypot(held.scatter);
-        level.abs() > LEVELS.ln() && growth > RESIDUALS.ln().max(SIGNIFICANT * std)
+        let middle = (least * most).sqrt();
+        let quiet = records.partition_point(|r| motion(r) < middle);
+        let (quiet, loud) = records.split_at(quiet);
+        let Some((quiet, loud)) = RecordPower::of(quiet).zip(RecordPower::of(loud)) else {
+            return false;
+        };
+        let growth = (loud.residual / quiet.residual).ln();
+        let std = loud.scatter.hypot(quiet.scatter);
+        loud.motion > LEVELS * quiet.motion && growth > RESIDUALS.ln().max(SIGNIFICANT * std)
     }
 }
 

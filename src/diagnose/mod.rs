@@ -214,6 +214,7 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
         units: case.units.clone(),
         held: None,
         rings_at_start: false,
+        late: None,
     };
     let mut context = plain::find_plain(&unscaled, case.declared, &case.records.train)?;
     if !case.records.are_free()
@@ -225,6 +226,7 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
         (case, context) = held;
     }
     let alignment = refuse::check(&case, &context)?;
+    context.late = alignment.as_ref().and_then(alignment::Alignment::late);
     case.records.prepare_for(&context);
     let mode = context.plain.mode();
     context.rings_at_start = case.records.train.iter().any(|r| r.sees_start(&mode));

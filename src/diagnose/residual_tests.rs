@@ -239,6 +239,14 @@ const MOTION_FUNCTIONS: [MotionFunction; 6] = [
 /// Name of the share linear in the input.
 pub const FROM_INPUT: &str = "the input";
 
+/// A function of the input that reaches the record without the stand, as cross-talk does; of the input in units of its RMS.
+type InputFunction = (&'static str, fn(f64) -> f64);
+
+const INPUT_FUNCTIONS: [InputFunction; 2] = [
+    ("the square of the input", |u| u * u),
+    ("the cube of the input", |u| u * u * u),
+];
+
 fn shares(residuals: &[RecordResidual], mode: &Mode) -> Vec<PowerShare> {
     let shortest = residuals.iter().map(|r| r.samples.len()).min();
     let length = (shortest.unwrap_or(0) / 24).next_power_of_two();
@@ -253,6 +261,12 @@ fn shares(residuals: &[RecordResidual], mode: &Mode) -> Vec<PowerShare> {
             let x = without_mean(&r.modelled);
             let (x, v) = (over_rms(&x), over_rms(&differences(&x)));
             x.iter().zip(&v).map(|(x, v)| function(*x, *v)).collect()
+        }));
+    }
+    for (of, function) in INPUT_FUNCTIONS {
+        found.push(pooled(of, &|r| {
+            let u = over_rms(&without_mean(&input(r)));
+            u.into_iter().map(function).collect()
         }));
     }
     found

@@ -262,16 +262,18 @@ impl SearchState {
         }
     }
 
-    /// The least needed effect, if its removal is not significant.
+    /// The least needed effect, if its removal is not significant. How much an effect must explain is decided by the training
+    /// records: held-out ones of another kind may show less of it.
     fn needless(&self, without: &[Option<ScoredModel>]) -> Option<usize> {
         let (after, excess) = (&self.after, self.excess());
         let noise = AppliedNoise::of(&self.records);
         let declared = after.fitted.structure.declared;
+        let is_training = self.records.holdout.is_empty();
         let is_needless = |k: usize, less: &ScoredModel| {
             no_gain(after, less).is_some()
                 || after.insignificant_of(declared + k).is_some()
                 || after.criterion() >= less.criterion()
-                || excess.is_too_small(less, after)
+                || is_training && excess.is_too_small(less, after)
                 || !noise.bears_out(less, after)
         };
         let all = without.iter().enumerate();

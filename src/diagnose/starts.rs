@@ -37,6 +37,17 @@ pub struct Start {
 }
 
 impl Start {
+    /// A start whose residual is not known.
+    fn untried(values: Vec<f64>, initial: Option<Vec<InitialState>>) -> Self {
+        Self {
+            values,
+            initial,
+            left: f64::INFINITY,
+            reduction: 0.0,
+            factor: 0.0,
+        }
+    }
+
     /// The training records with the initial states of the start.
     pub fn in_records<'r>(&self, training: &'r [StandRecord]) -> Cow<'r, [StandRecord]> {
         let Some(initial) = &self.initial else {
@@ -48,7 +59,7 @@ impl Start {
     }
 }
 
-/// The starts with the smallest residuals, at most `most` and that from the backbone of free decays: each as given and with the magnitude suggested by the
+/// The starts with the smallest residuals, at most `most` and those from the backbone of free decays or a shift: each as given and with the magnitude suggested by the
 /// residual.
 pub fn best_starts(
     base: &BaseModel,
@@ -91,7 +102,25 @@ pub fn best_starts(
     sort_by_number(&mut found, |start| start.left);
     found.truncate(most);
     found.extend(from_backbone(structure, plain, training));
+    found.extend(from_shift(structure));
     found
+}
+
+/// The start of a delay from the shift between the channels, as the first effect: while a delay is missing, the plain stand may
+/// have any frequency.
+fn from_shift(structure: &Structure) -> Option<Start> {
+    let [effect] = structure.effects.as_slice() else {
+        return None;
+    };
+    let context = &structure.context;
+    let late = context
+        .late
+        .filter(|_| effect.effect.name == "time-delay")?;
+    let delay = &effect.form.parameters[0];
+    let near = late.delay_s / delay.size(&context.scales);
+    let mut values = context.plain_values(&late.stand);
+    values.push(near.clamp(delay.lower, delay.upper));
+    Some(Start::untried(values, None))
 }
 
 /// The start from the amplitude dependence of frequency and decay rate of a free decay, for the first effect of a
@@ -114,13 +143,8 @@ fn from_backbone(structure: &Structure, plain: &[f64], training: &[StandRecord])
     values[1] = first.damping_ratio;
     values.push(size.clamp(bounds.lower, bounds.upper));
     values.extend(effect.form.starts[0][1..effect.moved()].iter());
-    Some(Start {
-        values,
-        initial: Some(each.iter().map(Backbone::initial).collect()),
-        left: f64::INFINITY,
-        reduction: 0.0,
-        factor: 0.0,
-    })
+    let initial = each.iter().map(Backbone::initial).collect();
+    Some(Start::untried(values, Some(initial)))
 }
 
 /// Start values of an effect's own parameters; for a line also the significant frequencies of the residual, for a train

@@ -58,6 +58,15 @@ pub struct FitContext {
     pub held: Option<HeldBody>,
     /// Whether free motion from the start of a record is visible in it.
     pub rings_at_start: bool,
+    /// What a shift between the channels suggests for a delay.
+    pub late: Option<LateStand>,
+}
+
+/// A plain stand, and the delay of its record.
+#[derive(Clone, Copy)]
+pub struct LateStand {
+    pub stand: PlainStand,
+    pub delay_s: f64,
 }
 
 impl FitContext {
@@ -222,8 +231,9 @@ pub struct Structure {
     pub declared: usize,
 }
 
-/// Bounds of the natural frequency, of the damping ratio and of the gain, as parameters of a fit.
-const PLAIN_BOUNDS: [[f64; 2]; 3] = [[0.02, 50.0], [0.0, 10.0], [-1e3, 1e3]];
+/// Bounds of the natural frequency, of the damping ratio and of the gain, as parameters of a fit. The gain, in units of that of
+/// the plain stand, is not bounded: one that cannot follow the records, as beside a delay, has nearly none.
+const PLAIN_BOUNDS: [[f64; 2]; 3] = [[0.02, 50.0], [0.0, 10.0], [-1e9, 1e9]];
 
 impl Structure {
     /// The plain stand without effects.

@@ -112,8 +112,8 @@ impl PlainExcess<'_> {
         self.share(after, next) < least
     }
 
-    /// Whether further effects of stand or gage explain nearly all of the measurable remainder above the noise. A slow
-    /// trend explains a little of everything.
+    /// Whether further effects explain nearly all of the measurable remainder above the noise: all of it, unless they are
+    /// of stand or gage, as a slow trend explains a little of everything.
     pub fn is_nearly_taken(&self, after: &ScoredModel, next: &ScoredModel) -> bool {
         let left = after.excess_power(noise_rms(self.noise_floor));
         let gain = after.compared_rms().powi(2) - next.compared_rms().powi(2);
@@ -122,7 +122,8 @@ impl PlainExcess<'_> {
         let mut further = added.filter(|own| !present.contains(&own.effect.name));
         is_above(after, self.noise_floor)
             && gain > NEARLY_ALL_OF_REST * left
-            && further.all(|own| own.form.stage <= Stage::Gage)
+            && (!is_above(next, self.noise_floor)
+                || further.all(|own| own.form.stage <= Stage::Gage))
     }
 
     /// The reason for that.
