@@ -156,13 +156,14 @@ impl SearchState {
         self.take_any(best.as_ref(), coarse)
     }
 
-    /// Refits the model from other starts of its effects while something is left, and returns whether that explains more:
-    /// without the effects found later, the search may have ended at a bound, or on the wrong side of zero.
+    /// Refits the model from other starts of its effects, and returns whether that explains more: without the effects found
+    /// later, the search may have ended at a bound, or, while something is left, on the wrong side of zero.
     pub(super) fn restart(&mut self, coarse: usize, workers: Workers) -> bool {
-        if !self.settled || !self.is_worthwhile(&self.after, &self.tests) {
+        if !self.settled {
             return false;
         }
-        let starts = from_other_starts(&self.after.fitted);
+        let is_left = self.is_worthwhile(&self.after, &self.tests);
+        let starts = from_other_starts(&self.after.fitted, is_left);
         let best = self.best_from(&starts, workers, |model| {
             model.criterion() < self.after.criterion() - SAME
         });
@@ -220,29 +221,54 @@ impl SearchState {
 }
 
 /// The model with the start values of its form, except for the size, for one of the added effects: one with a parameter at
-/// a bound, or that may lie on either side of zero.
-fn from_other_starts(fitted: &FittedModel) -> Vec<(Structure, Vec<f64>)> {
-    let structure = &fitted.structure;
-    let mut starts: Vec<(Structure, Vec<f64>)> = Vec::new();
-    for (k, (effect, own)) in structure.placed().enumerate() {
-        let of_form = effect.form.starts;
-        let shape = (0..own.len()).filter(|i| Some(*i) != effect.size());
-        let has_sides = |i: usize| of_form.iter().any(|s| s[i] < 0.0);
-        let is_stuck = fitted.std[own.clone()].iter().any(Option::is_none);
-        let is_doubtful = is_stuck || shape.clone().any(has_sides);
-        if k < structure.declared || effect.is_line() || !is_doubtful {
-            continue;
-        }
-        for start in of_form {
-            let mut values = fitted.values.clone();
-            let moved = shape.clone();
-            moved.for_each(|i| values[own.start + i] = start[i]);
-            if starts.iter().all(|(_, other)| *other != values) {
-                starts.push((structure.clone(), values));
+/// a bound, or, on request, that may lie on either side of zero.
+fn from_other_starts(fitted: &FittedModel, on_both_sides: bool) -> Vec<(Structure, Vec<f64>)> {
+    let shape = |effect: &EffectForm, i: usize| Some(i) != effect.size();
+    let has_sides = |effect: &EffectForm, i: usize| effect.form.starts.iter().any(|s| s[i] < 0.0);
+    let mut starts = fitted.with_start_values(|effect, own| {
+        let is_stuck = own.iter().any(Option::is_none);
+        let all = (0..own.len()).filter(|i| shape(effect, *i));
+        let may_turn = on_both_sides && all.clone().any(|i| has_sides(effect, i));
+        all.filter(|_| is_stuck || may_turn).collect()
+    });
+    starts.extend(fitted.off_bounds());
+    starts
+}
+
+impl FittedModel {
+    /// The model with start values for the parameters of an added effect that ended at a bound.
+    pub fn off_bounds(&self) -> Vec<(Structure, Vec<f64>)> {
+        self.with_start_values(|effect, own| {
+            let is_stuck = |i: &usize| own[*i].is_none() && Some(*i) != effect.size();
+            (0..own.len()).filter(is_stuck).collect()
+        })
+    }
+
+    /// The model with start values of its form for some parameters of one of the added effects, which are chosen by their
+    /// uncertainties.
+    fn with_start_values(
+        &self,
+        chosen: impl Fn(&EffectForm, &[Option<f64>]) -> Vec<usize>,
+    ) -> Vec<(Structure, Vec<f64>)> {
+        let structure = &self.structure;
+        let mut starts: Vec<(Structure, Vec<f64>)> = Vec::new();
+        let placed = structure.placed().enumerate();
+        for (_, (effect, own)) in
+            placed.filter(|(k, (e, _))| *k >= structure.declared && !e.is_line())
+        {
+            let chosen = chosen(effect, &self.std[own.clone()]);
+            for start in effect.form.starts {
+                let mut values = self.values.clone();
+                chosen
+                    .iter()
+                    .for_each(|i| values[own.start + i] = start[*i]);
+                if values != self.values && starts.iter().all(|(_, other)| *other != values) {
+                    starts.push((structure.clone(), values));
+                }
             }
         }
+        starts
     }
-    starts
 }
 
 /// Structures in which one of the added effects of the stand has another form, and start values with the same stiffness.

@@ -30,6 +30,8 @@ impl ScoredModel {
         };
         let mut forms = vec![(self.fitted.structure.clone(), self.fitted.values.clone())];
         forms.extend(self.fitted.plainer_forms());
+        // With coarse steps, what happens within a step has no minimum.
+        forms.extend(self.fitted.off_bounds());
         let models = parallel(forms.len(), threads, |k| {
             last(forms[k].0.clone(), &forms[k].1)
         });

@@ -65,17 +65,34 @@ impl Report for Diagnosis {
     }
 }
 
-/// Ratio of the hold-out error to the noise floor above which the floor is doubtful.
+/// Ratios of the hold-out error to the noise floor above which it is stated, and above which the floor is doubtful.
+const AT_FLOOR: f64 = 1.1;
 const ABOVE_FLOOR: f64 = 1.5;
+
+/// Ratio of a hold-out error to the noise floor; 1 if that is unknown.
+fn over_floor(diagnosis: &Diagnosis, holdout_rms: f64) -> f64 {
+    let floor = diagnosis.error.noise_floor_rms;
+    let floor = floor.filter(|floor| *floor > 0.0);
+    floor.map_or(1.0, |floor| holdout_rms / floor)
+}
+
+/// The verdict that effects explain the records.
+fn all_explained(diagnosis: &Diagnosis, names: &str) -> String {
+    let ratio = over_floor(diagnosis, diagnosis.error.after.rms.holdout_rms);
+    if ratio <= AT_FLOOR {
+        return format!("Explained: with {names}, the hold-out error is at the noise level.");
+    }
+    format!(
+        "Explained: with {names}, the hold-out error is {} times the noise floor, and no test shows a cause of the rest. \
+         Record the stand at rest: if that is quieter, something is still missing.",
+        rounded(ratio, 3)
+    )
+}
 
 /// The verdict that nothing is missing. An error above the floor of white noise can be coloured noise, or an effect that
 /// no test shows.
 fn nothing_missing(diagnosis: &Diagnosis) -> String {
-    let error = &diagnosis.error;
-    let ratio = error
-        .noise_floor_rms
-        .filter(|floor| *floor > 0.0)
-        .map_or(1.0, |floor| error.before.rms.holdout_rms / floor);
+    let ratio = over_floor(diagnosis, diagnosis.error.before.rms.holdout_rms);
     if ratio <= ABOVE_FLOOR {
         return "Nothing missing: the plain stand explains the hold-out records down to the noise."
             .to_owned();
@@ -95,9 +112,7 @@ pub fn answer(diagnosis: &Diagnosis) -> Vec<String> {
         _ => "reduce",
     };
     let verdict = match diagnosis.verdict {
-        Verdict::Explained => {
-            format!("Explained: with {names}, the hold-out error is at the noise level.")
-        }
+        Verdict::Explained => all_explained(diagnosis, &names),
         Verdict::PartlyExplained => format!(
             "Partly explained: {names} {reduce} the hold-out error, but structure above the noise remains."
         ),
