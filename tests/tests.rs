@@ -58,6 +58,7 @@ mod reports;
 mod running;
 mod schema;
 mod simulate;
+mod small_beside_large;
 mod standard_error;
 mod stated_std;
 mod surface;

@@ -12,7 +12,7 @@ use super::score::ScoredModel;
 use super::search::CandidateFit;
 use super::spectra::SpectralLine;
 use super::surface::ForceSurface;
-use super::verdict::Verdict;
+use super::verdict::{Verdict, is_noise};
 use crate::print::{self, relative, rounded};
 use crate::warning::Warning;
 
@@ -75,7 +75,7 @@ pub fn residual(
         );
     }
     let is_open = matches!(verdict, Verdict::Unexplained | Verdict::PartlyExplained);
-    if is_open && !found.is_noise(&found.before) {
+    if is_open && !is_noise(&found.before, found.noise_floor) {
         parts.extend(level_dependence(levels));
     }
     let line = |line: &SpectralLine| format!("a line at {} Hz", rounded(line.frequency_hz, 5));

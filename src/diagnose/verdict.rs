@@ -122,7 +122,7 @@ impl PlainExcess<'_> {
         let mut further = added.filter(|own| !present.contains(&own.effect.name));
         is_above(after, self.noise_floor)
             && gain > NEARLY_ALL_OF_REST * left
-            && (!is_above(next, self.noise_floor)
+            && (is_noise(next, self.noise_floor)
                 || further.all(|own| own.form.stage <= Stage::Gage))
     }
 
@@ -142,6 +142,11 @@ const RESONANCE: f64 = 10.0;
 /// Whether the error is measurably above a noise floor.
 pub fn is_above(model: &ScoredModel, floor: Option<NoiseFloor>) -> bool {
     floor.is_some_and(|floor| model.excess_power(floor.rms) > MEASURABLE * floor.rms.powi(2))
+}
+
+/// Whether a model leaves no more than the noise.
+pub fn is_noise(model: &ScoredModel, floor: Option<NoiseFloor>) -> bool {
+    floor.is_some_and(|floor| model.compared_rms() <= AT_FLOOR * floor.rms)
 }
 
 impl ScoredModel {
@@ -250,13 +255,7 @@ impl SearchState {
     /// Whether only white noise is left.
     pub(super) fn is_at_noise(&self) -> bool {
         let is_white = self.tests.white && !self.tests.follows_anything();
-        is_white && self.is_noise(&self.after)
-    }
-
-    /// Whether a model leaves no more than the noise in the hold-out records.
-    pub(super) fn is_noise(&self, model: &ScoredModel) -> bool {
-        let is_at = |f: NoiseFloor| model.compared_rms() <= AT_FLOOR * f.rms;
-        self.noise_floor.is_some_and(is_at)
+        is_white && is_noise(&self.after, self.noise_floor)
     }
 
     /// Whether only white noise is left, and no more than noise in the training records either.

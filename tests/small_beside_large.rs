@@ -1,0 +1,176 @@
+//! Effects that are small beside a larger one, that one kind of record hardly shows, or that hide the stand itself.
+
+use std::f64::consts::TAU;
+
+use serde_json::Value;
+
+use crate::noise::Noise;
+use crate::one_mode::{NATURAL_HZ, RATE_HZ, record};
+use crate::util::{Folder, number};
+
+/// A record whose measured values are changed, with the time, the applied and the measured torque.
+fn changed(text: &str, mut change: impl FnMut([f64; 3]) -> f64) -> String {
+    let mut rows = text.lines();
+    let mut all = rows.next().expect("a heading").to_owned() + "\n";
+    for row in rows {
+        let numbers: Vec<f64> = row
+            .split(',')
+            .map(|n| n.parse().expect("a number"))
+            .collect();
+        let [time_s, applied, measured] = numbers[..] else {
+            panic!("three columns: {row}")
+        };
+        let measured = change([time_s, applied, measured]);
+        all += &format!("{time_s:.6},{applied:.9},{measured:.9}\n");
+    }
+    all
+}
+
+/// Diagnosis of records, the last of which is held out.
+fn diagnosed(records: &[String]) -> Value {
+    let folder = Folder::new();
+    let names: Vec<String> = (0..records.len()).map(|k| format!("{k}.csv")).collect();
+    let mut words = vec![
+        "diagnose",
+        "--json",
+        "--applied",
+        "applied",
+        "--measured",
+        "measured",
+    ];
+    for (k, (name, text)) in names.iter().zip(records).enumerate() {
+        folder.write(name, text);
+        let is_last = k + 1 == records.len();
+        words.extend([if is_last { "--holdout" } else { "--train" }, name]);
+    }
+    let report = folder.json(&words);
+    println!(
+        "{} {} {}",
+        report["verdict"], report["effects"], report["error"]
+    );
+    report
+}
+
+/// Value and standard uncertainty of a parameter of an effect that is named.
+fn parameter(report: &Value, effect: &str, name: &str) -> [f64; 2] {
+    let candidates = report["candidates"].as_array().expect("a list").iter();
+    let mut named = candidates.filter(|c| c["effect"] == effect && c["status"] == "accepted");
+    let named = named.next().expect("it is named");
+    let mut parameters = named["parameters"].as_array().expect("a list").iter();
+    let found = parameters.find(|p| p["name"] == name).expect("a parameter");
+    ["value", "std"].map(|key| number(&found[key]))
+}
+
+fn check_parameter(report: &Value, (effect, name): (&str, &str), truth: f64) {
+    let [value, std] = parameter(report, effect, name);
+    assert!(
+        (value - truth).abs() < 3.5 * std,
+        "{effect} {name}: {value} ± {std}, not {truth}"
+    );
+}
+
+/// Smooth dry friction.
+fn friction(_: f64, _: f64, v: f64) -> f64 {
+    0.06 * (8.0 * v).tanh()
+}
+
+/// The drift leaves twice the noise, a small part of what friction does.
+#[test]
+fn a_drift_of_the_sensitivity_beside_dry_friction() {
+    let mut noise = Noise(31);
+    let records = [0.12, 0.08].map(|level| {
+        let (text, _) = record(friction, (level, 50.0), &mut noise);
+        changed(&text, |[time_s, _, y]| y * (1.0 + 0.0015 * time_s))
+    });
+    let report = diagnosed(&records);
+    assert_eq!(report["verdict"], "explained");
+    let mut effects: Vec<&str> = report["effects"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter_map(Value::as_str)
+        .collect();
+    effects.sort_unstable();
+    assert_eq!(effects, ["coulomb-friction", "thermal-drift"]);
+    check_parameter(&report, ("thermal-drift", "rate"), 0.0015);
+    check_parameter(&report, ("coulomb-friction", "torque"), 0.06);
+}
+
+/// A record of slow tones shows the creep, the held-out one hardly does.
+#[test]
+fn creep_that_the_held_out_record_hardly_shows() {
+    let mut noise = Noise(32);
+    let stiffens = |_: f64, x: f64, _: f64| 0.05 * x.powi(3);
+    let corner_hz = 0.3;
+    let records = [(0.12, 50.0), (0.06, 1.0), (0.1, 50.0)].map(|(level, to_hz)| {
+        let (text, _) = record(stiffens, (level, to_hz), &mut noise);
+        let mut lag = 0.0;
+        changed(&text, |[_, _, y]| {
+            lag += (1.0 - (-TAU * corner_hz / RATE_HZ).exp()) * (y - lag);
+            y + 0.03 * lag
+        })
+    });
+    let report = diagnosed(&records);
+    assert_eq!(report["verdict"], "explained");
+    check_parameter(&report, ("gage-creep", "share"), 0.03);
+}
+
+/// Cross-talk of the drive with its square: no effect of the list, and no noise.
+#[test]
+fn the_square_of_the_input_is_no_noise() {
+    let mut noise = Noise(33);
+    let records = [0.12, 0.05, 0.08].map(|level| {
+        let (text, _) = record(|_, _, _| 0.0, (level, 50.0), &mut noise);
+        changed(&text, |[_, u, y]| y + 0.01 * u * u)
+    });
+    let report = diagnosed(&records);
+    assert_eq!(report["verdict"], "unexplained");
+    let shares = report["residual"]["tests"]["shares"]
+        .as_array()
+        .expect("a list");
+    let share = |of: &str| {
+        let found = shares.iter().find(|s| s["of"] == of);
+        number(&found.expect("a share")["share"])
+    };
+    assert!(share("the square of the input") > 0.2, "{shares:?}");
+    let next = report["next_experiment"].to_string();
+    assert!(next.contains("bridge unexcited"), "{next}");
+}
+
+/// A measured channel that is late by a sixth of a period of the stand: without the delay, no plain stand follows the record.
+#[test]
+fn a_late_channel_is_a_delay_alone() {
+    let mut noise = Noise(34);
+    let late = 7;
+    let records = [0.12, 0.08].map(|level| {
+        let (text, _) = record(|_, _, _| 0.0, (level, 50.0), &mut noise);
+        let mut before = std::collections::VecDeque::from(vec![0.0; late]);
+        changed(&text, |[_, _, y]| {
+            before.push_back(y);
+            before.pop_front().expect("as many as it is late")
+        })
+    });
+    let report = diagnosed(&records);
+    assert_eq!(report["verdict"], "explained");
+    assert_eq!(report["effects"], serde_json::json!(["time-delay"]));
+    check_parameter(&report, ("time-delay", "delay"), late as f64 / RATE_HZ);
+}
+
+/// A spot whose friction turns within 3 % of the speed.
+#[test]
+fn a_spot_that_rubs_sharply_has_its_transition() {
+    let mut noise = Noise(35);
+    let spot =
+        |_: f64, x: f64, v: f64| 0.1 * (-((x - 0.4) / 0.25).powi(2)).exp() * (20.0 * v).tanh();
+    let records = [0.12, 0.1, 0.08].map(|level| record(spot, (level, 50.0), &mut noise).0);
+    let report = diagnosed(&records);
+    assert_eq!(report["verdict"], "explained");
+    let effect = "position-dependent-friction";
+    check_parameter(&report, (effect, "torque"), 0.1);
+    check_parameter(&report, (effect, "width"), 0.25);
+    check_parameter(
+        &report,
+        (effect, "transition_speed"),
+        TAU * NATURAL_HZ / 20.0,
+    );
+}
