@@ -116,7 +116,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["overtone", "a mode has two or three times the frequency and the decay rate of the strongest: it is distortion", "excite the stand less, or use a later part of the decay with --range"],
         ["one-hit", "a single hit does not show the error of its force, which dominates the uncertainties: those of frequency and damping are upper limits, that of the static gain may be too small", "take several hits"],
         ["nonlinear", "the response has power at frequencies that were not applied: the stand is nonlinear", "look for the cause with diagnose"],
-        ["mode-out-of-reach", "a fitted mode lies above all frequencies of the records and was dropped", "check for a shift between the channels, or choose fewer --modes"],
+        ["mode-out-of-reach", "a fitted mode lies above all frequencies of the records, or above the fitted ones without being determined by them, and was dropped", "check for a shift between the channels, excite higher frequencies, or choose fewer --modes"],
         ["undamped-left-out", "a mode without measurable damping was dropped", "choose fewer --modes, or record for longer"],
         ["residues-unknown", "a decay gives several modes, but not their residues in the response to a torque", "add the residues, or use identify response"],
         ["not-anchored", "only ratios of the constants are determined", "declare the inertia or the stiffness"],

@@ -6,6 +6,7 @@ mod decay;
 mod dry_friction;
 mod files;
 mod late_channels;
+mod reach;
 mod response;
 mod runup;
 mod short_hits;

@@ -9,8 +9,8 @@ use std::f64::consts::TAU;
 
 use torqcomp_model::Covariance;
 
-use super::Modal;
 use super::blocks::Set;
+use super::modal::{ABOVE, Modal};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::{Identification, Pole, overtone};
 use crate::print::rounded;
@@ -36,17 +36,39 @@ pub(super) enum Foreign {
     Steady,
 }
 
-fn natural_hz(pole: &Pole) -> f64 {
+/// Natural frequency in Hz.
+pub(super) fn natural_hz(pole: &Pole) -> f64 {
     pole.rate_per_s.hypot(pole.omega_rad_per_s) / TAU
 }
 
 /// Damping ratio above which a mode above the fitted band does not ring in it.
 const OVERDAMPED: f64 = 0.95;
+/// Fraction of the highest frequency of the search from which a mode is at its end.
+const AT_END: f64 = 0.999;
 
 /// Whether a mode lies above the fitted band and does not ring: what is left of a delay or a filter.
 fn is_out_of_band(modal: &Modal, pole: &Pole) -> bool {
     let natural = TAU * natural_hz(pole);
     natural > modal.highest_rad_per_s && pole.rate_per_s > OVERDAMPED * natural
+}
+
+/// Largest standard uncertainty of decay rate and frequency of a mode above the fitted band, relative to its natural
+/// frequency.
+const KNOWN: f64 = 0.1;
+
+/// Whether a mode lies above the fitted band and does not follow from it: at the end of the search, without damping, or
+/// without ringing in the band.
+pub(super) fn is_beyond(modal: &Modal, pole: &Pole) -> bool {
+    let omega = pole.omega_rad_per_s;
+    let is_at_end = omega > AT_END * ABOVE * modal.highest_rad_per_s;
+    let is_undamped = omega > modal.highest_rad_per_s && pole.rate_per_s == 0.0;
+    is_at_end || is_undamped || is_out_of_band(modal, pole)
+}
+
+/// Whether no mode belongs to the stand, and one is out of reach.
+pub(super) fn is_none_reached(modal: &Modal, covariance: &Covariance, set: &Set) -> bool {
+    let found = kinds(modal, covariance, set);
+    !found.contains(&None) && found.contains(&Some(Foreign::OutOfReach))
 }
 
 /// Whether a model has such a mode.
@@ -91,9 +113,15 @@ fn kinds(modal: &Modal, covariance: &Covariance, set: &Set) -> Vec<Option<Foreig
             .std(2 * k)
             .is_some_and(|std| pole.rate_per_s < DECAYS.0 * std);
         let is_steady = is_uncertain && pole.rate_per_s < DECAYS.1 * set.step_hz;
+        let natural = TAU * natural_hz;
+        let is_above = natural > modal.highest_rad_per_s;
+        let mut stds = [2 * k, 2 * k + 1]
+            .into_iter()
+            .filter_map(|i| covariance.std(i));
+        let is_unknown = stds.any(|std| std > KNOWN * natural);
         if natural_hz < set.step_hz || is_slow {
             Some(Foreign::Drift)
-        } else if natural_hz > highest_hz || is_out_of_band(modal, pole) {
+        } else if natural_hz > highest_hz || is_beyond(modal, pole) || is_above && is_unknown {
             Some(Foreign::OutOfReach)
         } else if pole.rate_per_s == 0.0 || is_steady {
             Some(Foreign::Steady)

@@ -2,6 +2,7 @@
 
 mod blocks;
 mod check;
+mod determined;
 mod force;
 mod foreign;
 mod inverse;
@@ -26,7 +27,6 @@ use torqcomp_model::Covariance;
 use super::mode::all_or_none;
 use super::{Identification, ModalPole};
 use crate::failure::{ErrorCode, Failure};
-use crate::print::rounded;
 use blocks::Set;
 use lines::Lines;
 pub use modal::Lag;
@@ -163,11 +163,9 @@ fn evaluate(
         below: !is_grounded,
         ..data
     };
-    let coarse = match is_grounded {
-        true => without_undamped(&set, &data, coarse, &mut result)?,
-        false => coarse,
-    };
     let of = (&set, &lines);
+    let kinds = (leads, is_grounded, options.band_hz.is_some());
+    let coarse = determined::determined((&set, &data), coarse, kinds, &mut result)?;
     let fitted = final_fit(whole, of, options, (&data, &coarse), &mut result)?;
     let is_poor = fitted.relative.is_nan() || fitted.relative >= check::POOR;
     if order::is_unexplained(&held_out) && is_poor {
@@ -178,6 +176,7 @@ fn evaluate(
     if leads && check::is_out_of_reach(&set, &fitted.modal) {
         return Err(Failure::failed(ErrorCode::UnsuitableRecord, check::LEADS));
     }
+    determined::must_reach((&set, &data), &fitted, options.band_hz.is_some())?;
     foreign::warn(&mut result, &fitted.modal, is_grounded)?;
     foreign::tell_overtones(&mut result, &fitted.modal);
     present::add_modes(&mut result, &fitted);
@@ -245,34 +244,6 @@ impl FinalFit {
             self.linear + 2 * k + 1,
         ]);
         ModalPole::with_residue(pole, residue / unit, covariance).scaled(unit)
-    }
-}
-
-/// The fit without modes whose damping is not identifiable from these records: they are caused by noise and
-/// nonlinearity, and in a stand file they would ring forever.
-fn without_undamped(
-    set: &Set,
-    data: &Data,
-    coarse: Modal,
-    result: &mut Identification,
-) -> Result<Modal, Failure> {
-    let (mut starts, delay_s) = (coarse.poles, coarse.delay_s);
-    let mut left_out = Vec::new();
-    loop {
-        let fitted = data.fit(&starts, delay_s, Effort::Fine)?;
-        let undamped = fitted
-            .poles
-            .iter()
-            .position(|pole| foreign::is_undamped(pole, set));
-        let Some(undamped) = undamped else {
-            foreign::undamped(result, &left_out);
-            return Ok(fitted);
-        };
-        if starts.len() == 1 {
-            return Err(Failure::failed(ErrorCode::NotIdentifiable, foreign::NONE));
-        }
-        starts = fitted.poles;
-        left_out.push(rounded(starts.remove(undamped).frequency_hz(), 5));
     }
 }
 

@@ -79,6 +79,9 @@ impl Lag {
 /// Longest delay in half periods of the highest frequency.
 const DELAY_HALF_PERIODS: f64 = 8.0;
 
+/// Largest frequency of a mode in the search, relative to the highest fitted one.
+pub(super) const ABOVE: f64 = 1.3;
+
 /// Precision of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Effort {
@@ -292,7 +295,7 @@ impl Data {
             parameters.push(Parameter::new(format!("rate {}", k + 1), rate).at_least(0.0));
             let omega = pole.omega_rad_per_s.clamp(0.5 * low, 1.2 * high);
             let omega = Parameter::new(format!("omega {}", k + 1), omega);
-            parameters.push(omega.at_least(0.4 * low).at_most(1.3 * high));
+            parameters.push(omega.at_least(0.4 * low).at_most(ABOVE * high));
         }
         if self.lag.is_some() {
             let most_s = self.longest_delay_s();

@@ -5,7 +5,7 @@ use torqcomp_dsp::frf::{self, Estimator, Powers, Window};
 use super::blocks::Set;
 use super::lines::{self, Lines, MOST_LINES, data};
 use super::whole::Whole;
-use super::{Data, Effort, FinalFit, Modal, ResponseOptions, shift};
+use super::{Data, Effort, FinalFit, Modal, ResponseOptions, determined, shift};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::rounded;
 
@@ -21,6 +21,9 @@ const PATIENCE: usize = 3;
 
 /// Ratio of the hold-out error of fewer modes to the minimum, up to which they are preferred.
 const SLACK: f64 = 1.05;
+
+/// Hold-out error without modes up to which the response follows the applied signal without them.
+const FLAT: f64 = 0.1;
 
 /// Adds one mode; `None` if no line is left to start from. The first one with a delay starts from a mode without one.
 pub(super) fn grow(
@@ -95,6 +98,9 @@ pub(super) fn order(
     // Leakage may hide a mode in blocks, but not in whole records.
     let best = match (fewest(&errors), set.window) {
         (0, Window::Hann) if errors.len() > 1 => least_of_some(&errors),
+        (0, _) if errors[0] < FLAT => {
+            return Err(determined::none(data, None, options.band_hz.is_some()));
+        }
         (0, _) => return Err(unexplained()),
         (best, _) => best,
     };
