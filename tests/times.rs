@@ -954,3 +954,54 @@ fn lost_samples_between_rounded_stamps_are_named_with_their_place() {
         );
     }
 }
+
+/// Whole seconds and nanoseconds in two columns, from 0.82 s of a second on, so short that the seconds change once or never,
+/// and with one or two channels after them.
+#[test]
+fn seconds_and_nanoseconds_of_short_records_are_exact() {
+    let start_ns = 1_710_238_532_823_456_789_u128;
+    for (step_ns, count) in [
+        (100_000, 900),
+        (100_000, 5000),
+        (1_000_000, 120),
+        (1_000_000, 800),
+    ] {
+        for headings in [
+            "header.stamp.sec,header.stamp.nanosec,frame_id,name[0],torque [N m]",
+            "header.stamp.sec,header.stamp.nanosec,torque [N m]",
+            "secs,nsecs,torque [N m],force [N]",
+            "sec,nanosec,torque [N m]",
+        ] {
+            let row = |i: u128| {
+                let ns = start_ns + i * step_ns;
+                let (whole, part) = (ns / 1_000_000_000, ns % 1_000_000_000);
+                let torque = 5.0 + (i as f64 * 0.03).sin();
+                match headings {
+                    _ if headings.contains("name") => {
+                        format!("{whole},{part},base,motor,{torque:.6}\n")
+                    }
+                    _ if headings.contains("force") => format!("{whole},{part},{torque:.6},1.5\n"),
+                    _ => format!("{whole},{part},{torque:.6}\n"),
+                }
+            };
+            let folder = Folder::new();
+            folder.write(
+                "in.csv",
+                format!("{headings}\n{}", (0..count).map(row).collect::<String>()),
+            );
+            let ran =
+                folder.run(&[&COMPENSATE[..], &["--channel", "torque", "--band", "100"]].concat());
+            assert_eq!(ran.code, 0, "{headings}: {}", ran.stderr);
+            let out = folder.read("out.csv");
+            let stamp = |line: usize| out.lines().nth(line).and_then(|l| l.split(',').next());
+            for i in [0, 1, count - 1] {
+                let want = seconds(start_ns + i * step_ns, 9);
+                assert_eq!(
+                    stamp(i as usize + 1),
+                    Some(&want[..]),
+                    "{headings} {step_ns} {i}"
+                );
+            }
+        }
+    }
+}

@@ -4,7 +4,6 @@ use super::groups::Group;
 use super::stamps::{TIME_FACTORS, rises};
 use super::{AxisRule, SAME, Sources};
 use crate::failure::{ErrorCode, Failure};
-use crate::recording::text::rows::ColumnKind;
 use crate::recording::text::units;
 use crate::recording::typical_step;
 
@@ -122,12 +121,8 @@ impl Sources<'_> {
         };
         let own = self.scaled(place, factor);
         let step = typical_step(&own).unwrap_or(f64::INFINITY);
-        let origin = |place: usize| match self.kinds[place] {
-            ColumnKind::Offset(origin) => origin as f64,
-            _ => 0.0,
-        };
-        let origins =
-            origin(place) * factor - origin(first) * known.map_or(1.0, |(_, first)| first);
+        let of_first = self.origin(first) * known.map_or(1.0, |(_, first)| first);
+        let origins = self.origin(place) * factor - of_first;
         rates_differ(&stamps, &own) || (own[0] - stamps[0] + origins).abs() > step / 2.0
     }
 

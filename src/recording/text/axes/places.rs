@@ -137,8 +137,9 @@ impl Sources<'_> {
     fn is_part(&self, place: usize, whole: usize) -> bool {
         let whole = &self.columns[whole];
         let are_whole = || whole.values.iter().all(|value| value.fract() == 0.0);
-        let parts = &self.columns[place].values;
-        are_whole() && parts.iter().all(|part| *part >= 0.0 && part.fract() == 0.0)
+        let (parts, origin) = (&self.columns[place].values, self.origin(place));
+        let is_part = |part: &f64| origin + part >= 0.0 && part.fract() == 0.0;
+        are_whole() && parts.iter().all(is_part)
     }
 
     /// A first column named like time or temperature, if no other is time and it always rises, and
@@ -231,12 +232,9 @@ impl Sources<'_> {
     /// 1970 and their nanoseconds, as written by `ros2 topic echo --csv`.
     pub(super) fn stamp_without_heading(&self, place: usize) -> Option<f64> {
         let (seconds, nanoseconds) = (self.columns.first()?, self.columns.get(1)?);
-        let origin = match self.kinds[0] {
-            ColumnKind::Offset(origin) => origin as f64,
-            _ => 0.0,
-        };
-        let is_epoch = EPOCH_S.contains(&(origin + seconds.values.first()?));
-        let are_nanoseconds = nanoseconds.values.iter().any(|part| *part >= 1e6);
+        let is_epoch = EPOCH_S.contains(&(self.origin(0) + seconds.values.first()?));
+        let origin = self.origin(1);
+        let are_nanoseconds = nanoseconds.values.iter().any(|part| origin + part >= 1e6);
         let is_stamp = is_epoch && are_nanoseconds && self.is_unnamed(0) && self.is_unnamed(1);
         [1.0, 1e-9].get(place).copied().filter(|_| is_stamp)
     }

@@ -50,6 +50,8 @@ pub struct Parts {
     seconds_per_unit: f64,
     /// The whole seconds of the first row, subtracted from the others to preserve the precision of the fraction.
     whole: f64,
+    /// Origin of its values.
+    origin: f64,
 }
 
 impl StampRule {
@@ -65,7 +67,7 @@ impl StampRule {
         }
         if let Some(rule) = self.parts {
             for (stamp, part) in stamps.iter_mut().zip(&columns[rule.place].values) {
-                *stamp = *stamp - rule.whole + part * rule.seconds_per_unit;
+                *stamp = *stamp - rule.whole + (part + rule.origin) * rule.seconds_per_unit;
             }
         }
         if self.is_sum {
@@ -167,9 +169,10 @@ impl Sources<'_> {
                 place: beside,
                 seconds_per_unit: self.own_seconds(beside).unwrap_or(1e-3),
                 whole: 0.0,
+                origin: self.origin(beside),
             })
             .filter(|parts| {
-                let values = &self.columns[parts.place].values;
+                let values = &self.absolute(parts.place);
                 // Within the first second they rise, like milliseconds since the start: `Elapsed [ms]`.
                 let name = self.fields[parts.place].name.to_lowercase();
                 let is_unit = || meaning("time units", &name).is_some();
@@ -203,11 +206,7 @@ impl Sources<'_> {
         let place = *group.times.iter().find(|p| self.parts_of(**p).is_some())?;
         let parts = self.parts_of(place)?;
         let is_there = group.times.contains(&parts.place);
-        let origin = match self.kinds[place] {
-            ColumnKind::Offset(origin) => origin as f64,
-            _ => 0.0,
-        };
-        let origin_ns = ((origin + parts.whole) * 1e9) as i64;
+        let origin_ns = ((self.origin(place) + parts.whole) * 1e9) as i64;
         Some(StampRule {
             origin_ns,
             clock: Some(ClockOrigin::utc(origin_ns)).filter(|_| origin_ns != 0),
@@ -238,12 +237,13 @@ impl Sources<'_> {
                 place: beside,
                 seconds_per_unit: seconds_of(beside).filter(|seconds| *seconds < 1e-2)?,
                 whole,
+                origin: self.origin(beside),
             };
             let is_part = |value: &f64| {
                 value.fract() == 0.0 && (0.0..1.0).contains(&(value * parts.seconds_per_unit))
             };
             let is_filled = numbers(beside).len() == numbers(place).len();
-            (is_filled && !self.is_clock(beside) && numbers(beside).iter().all(is_part))
+            (is_filled && !self.is_clock(beside) && self.absolute(beside).iter().all(is_part))
                 .then_some(parts)
         })?;
         // A pair of two unrelated times would not rise.
@@ -252,6 +252,21 @@ impl Sources<'_> {
             ..StampRule::of_seconds("", place)
         };
         rises(&rule.stamps(self.columns)).then_some(known)
+    }
+
+    /// Origin of the values of a column.
+    pub(super) fn origin(&self, place: usize) -> f64 {
+        match self.kinds[place] {
+            ColumnKind::Offset(origin) => origin as f64,
+            _ => 0.0,
+        }
+    }
+
+    /// The values of a column as they are in the file.
+    fn absolute(&self, place: usize) -> Vec<f64> {
+        let origin = self.origin(place);
+        let values = self.columns[place].values.iter();
+        values.map(|value| value + origin).collect()
     }
 
     fn number_rule(
