@@ -1,5 +1,7 @@
 //! Time stamps: the rate that they give, the same in every command, and missing samples among them.
 
+use std::f64::consts::TAU;
+
 use serde_json::Value;
 
 use crate::mcap_file::{Cdr, McapFile};
@@ -1004,4 +1006,35 @@ fn seconds_and_nanoseconds_of_short_records_are_exact() {
             }
         }
     }
+}
+
+/// Steps of 0.05 to 0.5 ms without order, as of a variable-step solver: the rate alone puts the samples elsewhere, which is
+/// said, and interpolation keeps their times.
+#[test]
+fn stamps_without_a_usual_step_are_interpolated() {
+    let mut noise = crate::noise::Noise(5);
+    let mut at = 0.0;
+    let mut rows = String::from("time_s,torque [N m]\n");
+    while at < 0.5 {
+        rows += &format!("{at:.8},{:.6}\n", 7.0 + (TAU * 40.0 * at).sin());
+        at += 5e-5 * 10.0_f64.powf(noise.uniform());
+    }
+    let folder = Folder::new();
+    folder.write("in.csv", rows);
+    let run = |more: &[&str]| {
+        folder.run(&[&COMPENSATE[..], &["--band", "100", "--force"], more].concat())
+    };
+    run(&[]).says(1, &["--resample --rate HZ", "mean rate"]);
+    run(&["--rate", "5000"]).says(0, &["rate-overrides-stamps", "--resample --rate HZ"]);
+    for rate in ["5500", "6000"] {
+        run(&["--resample", "--rate", rate]).says(0, &["resampled"]);
+        let times = crate::util::column(&folder.read("out.csv"), "time_s");
+        assert!((times.last().expect("rows") - 0.5).abs() < 1e-3, "{rate}");
+    }
+    let inspected = folder.run(&["inspect", "in.csv"]);
+    assert!(
+        inspected.stdout.contains("--resample --rate HZ"),
+        "{}",
+        inspected.stdout
+    );
 }

@@ -9,7 +9,8 @@ use torqcomp_dsp::quality::steps::{Event, Events, Steps, broken_steps, rounded_s
 use crate::print::plural;
 use crate::print::rounded as number;
 use crate::recording::{
-    COARSE_STAMPS, Channel, REVERSED, TimeAxis, contradicted, falls, rates_of, same_stamps,
+    COARSE_STAMPS, Channel, REVERSED, TimeAxis, advice_for_uneven, contradicted, falls, rates_of,
+    same_stamps,
 };
 use crate::warning::Warning;
 
@@ -130,7 +131,10 @@ fn missing(whose: &str, axis: &TimeAxis) -> Option<Warning> {
         // A list without messages has no rate.
         Some([]) => return None,
         Some(stamps) if falls(stamps) => REVERSED.to_owned(),
-        Some(_) => format!("the time stamps have no usual step; {given}"),
+        Some(stamps) => {
+            let advice = advice_for_uneven(stamps).unwrap_or_else(|| given.to_owned());
+            format!("the time stamps have no usual step; {advice}")
+        }
         None => format!("the file has neither time stamps nor a rate; {given}"),
     };
     let message = format!("{whose}: the sampling rate is unknown, because {why}");

@@ -6,11 +6,12 @@ use torqcomp_decimal::digits;
 use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
 use torqcomp_model::Unit;
 
-use super::axis::{REVERSED, falls, step_of};
+use super::axis::step_of;
 use super::moment::Moment;
 use super::shared_stamps::refuse_shared_stamps;
 use super::stamps::TOLERABLE;
 use super::text::CELLS_WITH_UNITS;
+use super::uneven::{advice_for_uneven, without_rate};
 use super::{Channel, Hole, HoleKind, RateFrom, Recording, check_holes, check_size, formats};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading, already_compensated};
@@ -218,7 +219,17 @@ pub(crate) fn unit_of(
 /// A warning if a given rate contradicts the stamps.
 pub(crate) fn overridden(reading: &Reading, stamps_in: &str, stamps_s: &[f64]) -> Option<Warning> {
     let rate_hz = reading.rate_hz.filter(|_| !reading.resample)?;
-    let stamped = step_of(stamps_s, 0.0)?;
+    let given = digits::text(rate_hz, 7);
+    let Some(stamped) = step_of(stamps_s, 0.0) else {
+        let advice = advice_for_uneven(stamps_s)?;
+        return Some(Warning::new(
+            "rate-overrides-stamps",
+            format!(
+                "the stamps in \"{stamps_in}\" have no usual step, and --rate places the samples at equal steps of \
+                 {given} Hz, which gives other times and frequencies: {advice}"
+            ),
+        ));
+    };
     let stamped_hz = 1.0 / stamped.step;
     let uncertain = 3.0 * stamped.rate_std_hz(stamped_hz).unwrap_or(0.0) / stamped_hz;
     if (rate_hz / stamped_hz - 1.0).abs() <= uncertain.max(TOLERABLE) {
@@ -227,10 +238,8 @@ pub(crate) fn overridden(reading: &Reading, stamps_in: &str, stamps_s: &[f64]) -
     Some(Warning::new(
         "rate-overrides-stamps",
         format!(
-            "the stamps in \"{stamps_in}\" give {} Hz, --rate says {} Hz; {} Hz was used",
-            digits::text(stamped_hz, 7),
-            digits::text(rate_hz, 7),
-            digits::text(rate_hz, 7)
+            "the stamps in \"{stamps_in}\" give {} Hz, --rate says {given} Hz; {given} Hz was used",
+            digits::text(stamped_hz, 7)
         ),
     ))
 }
@@ -440,20 +449,4 @@ impl Channel {
             segment: self.segment,
         }
     }
-}
-
-fn without_rate(channel: &Channel) -> Failure {
-    let given = "give it with --rate HZ, or name the column of stamps with --time-column";
-    let why = match channel.axis.stamps_s.as_deref() {
-        Some(stamps) if falls(stamps) => REVERSED.to_owned(),
-        Some(_) => format!("its time stamps have no usual step; {given}"),
-        None => format!("the file has neither time stamps nor a rate; {given}"),
-    };
-    Failure::failed(
-        ErrorCode::TimeUnknown,
-        format_args!(
-            "the sampling rate of \"{}\" is unknown, because {why}",
-            channel.name
-        ),
-    )
 }

@@ -25,6 +25,7 @@ mod spool;
 mod stamps;
 mod stream;
 pub mod text;
+mod uneven;
 mod uniform;
 mod validator;
 
@@ -53,6 +54,7 @@ pub(crate) use shared_stamps::same_stamps;
 pub(crate) use spool::Spool;
 pub(crate) use stamps::{COARSE_STAMPS, StampGrid, is_uniform, rates_of};
 pub(crate) use stream::ChannelStream;
+pub(crate) use uneven::advice_for_uneven;
 pub(crate) use uniform::{UniformRecord, UniformStream, doubts};
 pub(crate) use validator::{StreamSummary, StreamValidator};
 

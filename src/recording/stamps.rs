@@ -4,15 +4,13 @@ use torqcomp_decimal::digits;
 use torqcomp_dsp::quality::broken_line::BrokenLine;
 
 use super::Channel;
-use super::axis::{
-    REVERSED, RateFrom, TimeAxis, UNIFORM, falls, rounding, step_of, without_rounding,
-};
+use super::axis::{RateFrom, TimeAxis, UNIFORM, rounding, step_of, without_rounding};
 use super::checkpoints::sharpened;
 use super::moment::Moment;
 use super::shared_stamps::{refuse_shared_stamps, same_stamps};
+use super::uneven::{mean_step, no_step};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
-use crate::print::plural;
 use crate::warning::Warning;
 
 /// Minimum reported rounding of stamps, relative to their step.
@@ -78,9 +76,14 @@ impl TimeAxis {
         reading: &Reading,
     ) -> Result<Self, Failure> {
         let origin = grid.origin_ns as f64 * 1e-9 / grid.seconds_per_unit;
-        let typical = step_of(first, origin)
-            .ok_or_else(|| Failure::failed(ErrorCode::IrregularTime, no_step(heading, first)))?;
-        let typical = sharpened(typical, first, later, origin).unwrap_or(typical);
+        let typical = match step_of(first, origin) {
+            Some(typical) => sharpened(typical, first, later, origin).unwrap_or(typical),
+            None => mean_step(first)
+                .filter(|_| reading.resample && reading.rate_hz.is_some())
+                .ok_or_else(|| {
+                    Failure::failed(ErrorCode::IrregularTime, no_step(heading, first))
+                })?,
+        };
         grid.resampled = reading.resample;
         if reading.resample {
             refuse_shared_stamps(first, typical.step, origin, grid.seconds_per_unit)?;
@@ -328,7 +331,7 @@ impl StampGrid {
         if found.after == found.before {
             return format!(
                 "the time stamp {after} repeats the one before it: a sample is stored twice, or the clock stood still; \
-                 remove the sample, or give the rate with --rate HZ if the stamps are wrong"
+                 use --resample to drop the sample, or --rate HZ if the stamps are wrong"
             );
         }
         let length = (found.after - found.before) / step;
@@ -467,24 +470,6 @@ pub(super) fn check_resampled(rate_hz: f64, recorded_hz: f64) -> Result<(), Fail
             digits::text(rate_hz, 6)
         ),
     ))
-}
-
-fn no_step(heading: &str, times: &[f64]) -> String {
-    let why = match times {
-        [] | [_] => {
-            return format!(
-                "\"{heading}\" has {}, so the sampling rate is unknown; give it with --rate HZ",
-                plural(times.len(), "stamp")
-            );
-        }
-        _ if falls(times) => return format!("\"{heading}\": {REVERSED}"),
-        _ if times.windows(2).all(|pair| pair[1] <= pair[0]) => "do not rise",
-        _ => "have no usual step: fewer than half of their steps are within 25 % of the median one",
-    };
-    format!(
-        "the stamps in \"{heading}\" {why}; give the rate with --rate HZ, another column with --time-column, or another clock \
-         of an MCAP file with --time log, publish or header"
-    )
 }
 
 #[cfg(test)]
