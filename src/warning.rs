@@ -49,7 +49,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["lines-between-orders", "strong lines lie between the orders: the given fundamental may be a multiple of the speed", "give --fundamental as the speed, or add the orders"],
         ["speed-changes", "the speed changes or fluctuates over the record, so the components are averages", "select a part of constant speed with --range"],
         ["phase-hidden", "the signal at the frequency of a line, or of spikes, masks its phase, so part of it remains", "record without excitation at this frequency"],
-        ["resonance-elsewhere", "the record shows no resonance at the declared frequency, but one nearby", "determine the stand's constants with identify decay"],
+        ["resonance-elsewhere", "the record shows no resonance at the declared frequency, but one elsewhere", "determine the stand's constants with identify decay"],
         ["resonance-above-nyquist", "the resonance is above half the sampling rate, so its ringing aliases into the record", "record at a higher rate, or through a low-pass"],
         ["resampled-gaps", "gaps in the time stamps were filled by linear interpolation", "check these places, or cut the record there"],
         ["resampled-uneven", "stamps that nearly coincide were interpolated by straight lines", "give --rate if the stamps are times of arrival"],

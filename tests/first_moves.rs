@@ -599,6 +599,40 @@ fn ringing_at_another_frequency_than_the_declared_one_is_said() {
     }
 }
 
+/// Half a second with two steps that ring at 590 Hz, and a natural frequency in rad/s, of another decade, or right.
+#[test]
+fn ringing_far_from_the_declared_frequency_is_said() {
+    let mut noise = crate::noise::Noise(31);
+    let omega = TAU * 590.0;
+    let step = |t: f64| match t < 0.0 {
+        true => 0.0,
+        false => 1.0 - (-0.02 * omega * t).exp() * (omega * t).cos(),
+    };
+    let noise: Vec<f64> = (0..5000).map(|_| 2e-3 * noise.normal()).collect();
+    let torque =
+        |t: f64| 5.0 + 2.0 * step(t - 0.05) - 3.0 * step(t - 0.28) + 0.3 * (TAU * 47.0 * t).sin();
+    let folder = Folder::new();
+    let sample = |i: usize| torque(i as f64 * 1e-4) + noise[i];
+    folder.write("in.csv", sampled("T [N m]", 10_000.0, 5000, sample));
+    for (declared, said) in [
+        ("3707.1 Hz", Some("2 pi times as high")),
+        ("93.9 Hz", Some("2 pi times as low")),
+        ("1180 Hz", Some("resonance at 5")),
+        ("300 Hz", Some("resonance at 5")),
+        ("590 Hz", None),
+    ] {
+        folder.write("stand.toml", stand("").replace("60 Hz", declared));
+        let report = folder.json(&[&COMPENSATE[..], &["--json", "--force"]].concat());
+        let warnings = report["warnings"].to_string();
+        let is_said = warnings.contains("resonance-elsewhere");
+        assert_eq!(is_said, said.is_some(), "{declared}: {warnings}");
+        assert!(
+            said.is_none_or(|said| warnings.contains(said)),
+            "{declared}: {warnings}"
+        );
+    }
+}
+
 /// A mass of 2 kg under a force of two sines, with the motor current recorded in mA: a factor per A, per mA, and one
 /// for another quantity.
 #[test]

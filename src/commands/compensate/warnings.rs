@@ -2,6 +2,7 @@
 
 use torqcomp_dsp::noise::RecordNoise;
 use torqcomp_dsp::quality::resonance::other_resonance;
+use torqcomp_dsp::quality::ringing::ringing_elsewhere;
 use torqcomp_model::Mode;
 
 use super::Seen;
@@ -109,20 +110,45 @@ pub(super) fn modes(stand: &Stand) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// A warning if the record rings near, but not at, the declared natural frequency.
+/// A warning if the record rings elsewhere than at the declared natural frequency.
 fn of_resonance(report: &CompensateReport, seen: &Seen) -> Option<Warning> {
-    let found = other_resonance(&seen.excerpt, report.rate_hz, &report.modes)?;
+    let found = other_resonance(&seen.excerpt, report.rate_hz, &report.modes)
+        .or_else(|| ringing_elsewhere(&seen.excerpt, report.rate_hz, &report.modes))?;
+    let declared_hz = report.modes[0].0;
     Some(Warning::new(
         "resonance-elsewhere",
         format!(
             "the record has a resonance at {} Hz (damping ratio about {}) and none at {} Hz, the natural frequency in \
-             the stand file: if it is the stand's, the result is wrong. Record a tap on the stand as it is and \
+             the stand file{}: if it is the stand's, the result is wrong. Record a tap on the stand as it is and \
              determine its constants with identify decay; if it is the machine's, ignore this",
             rounded(found.frequency_hz, 3),
             rounded(found.damping_ratio, 1),
-            rounded(report.modes[0].0, 4)
+            rounded(declared_hz, 4),
+            of_turns(declared_hz, found.frequency_hz).unwrap_or_default()
         ),
     ))
+}
+
+/// Largest relative deviation of the ratio of two frequencies from 2π.
+const TURNS: f64 = 0.05;
+
+/// Note if rad/s and Hz seem to be confused.
+fn of_turns(declared_hz: f64, found_hz: f64) -> Option<String> {
+    let is_turn = |ratio: f64| (ratio / std::f64::consts::TAU - 1.0).abs() < TURNS;
+    let [declared, found] = [declared_hz, found_hz].map(|hz| rounded(hz, 4));
+    if is_turn(declared_hz / found_hz) {
+        Some(format!(
+            ", which is about 2 pi times as high ({declared} rad/s is {} Hz; was it written in Hz?)",
+            rounded(declared_hz / std::f64::consts::TAU, 4)
+        ))
+    } else if is_turn(found_hz / declared_hz) {
+        Some(format!(
+            ", which is about 2 pi times as low ({found} rad/s is {} Hz; was it divided by 2 pi twice?)",
+            rounded(found_hz / std::f64::consts::TAU, 4)
+        ))
+    } else {
+        None
+    }
 }
 
 fn of_unknown_noise(report: &CompensateReport) -> Option<Warning> {

@@ -17,6 +17,7 @@
 //! | coarse resolution | [`quantisation`](mod@quantisation) |
 //! | mains hum | [`mains`](mod@mains) |
 //! | a resonance other than the declared one | [`resonance`] |
+//! | free decays far from the declared modes | [`ringing`] |
 //! | number, range, mean and standard deviation of a stream | [`sums`] |
 //! | channels that are copies of each other | [`copies`](mod@copies) |
 
@@ -31,6 +32,7 @@ pub mod quantisation;
 pub mod rate;
 pub mod repeats;
 pub mod resonance;
+pub mod ringing;
 pub mod rounding;
 mod runs;
 pub mod spikes;
