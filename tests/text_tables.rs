@@ -764,3 +764,24 @@ fn words_above_columns_between_spaces_name_their_own() {
         .fold(0.0_f64, |m, v| m.max(v.abs()));
     assert!(largest < 1.5, "{largest}");
 }
+
+/// The common factor of a matrix displayed by MATLAB multiplies every column.
+#[test]
+fn a_displayed_matrix_with_a_common_factor_is_refused() {
+    let rows = rows(|t, v| format!("    {:.6}    {v:.6}\n", 1e-3 * t));
+    for (factor, is_refused) in [
+        ("\n    1.0e+03 *\n\n", true),
+        ("y =\n\n   1.0e-03  *\n", true),
+        ("\n    1.0e+00 *\n", false),
+        ("\n", false),
+    ] {
+        let folder = Folder::new();
+        folder.write("in.csv", format!("{factor}{rows}"));
+        let more = ["--channel", "2", "--unit", "V", "--rate", "10000"];
+        let ran = folder.run(&[&COMPENSATE[..], &more].concat());
+        match is_refused {
+            true => ran.says(1, &["common factor", "writematrix"]),
+            false => ran.says(0, &[]),
+        };
+    }
+}

@@ -6,6 +6,7 @@ use super::cell::Cell;
 use super::cells_with_units::unit_of_cell;
 use super::chunks::Chunks;
 use super::commas;
+use super::display_scale;
 use super::rows::cleaned;
 use super::table::FIRST_ROWS;
 use super::thousands;
@@ -155,6 +156,7 @@ fn find_in(head: &Head, marks: &DialectOverride) -> Result<Table, Failure> {
     let strict = tables(head, &all, strict_row);
     if let Some(best) = best(&strict) {
         let mut table = unambiguous(head, &strict, best)?.table.clone();
+        display_scale::refuse(head, &table)?;
         table.first = upward::first_row(head, &table);
         if marks.delimiter.is_none() {
             commas::refuse(head, &table)?;

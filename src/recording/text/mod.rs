@@ -15,6 +15,7 @@ mod clock;
 mod commas;
 mod decode;
 mod dialect;
+mod display_scale;
 mod encoding;
 mod head;
 mod header;
