@@ -320,6 +320,27 @@ impl Stand {
         self.mechanics.as_ref()?.static_gain.as_ref()
     }
 
+    /// Failure for a static gain that is applied over recorded quantity.
+    fn inverse_gain(
+        &self,
+        channel: &str,
+        named: &NamedUnit,
+        gain: &super::StaticGain,
+        [over, under]: [&Unit; 2],
+    ) -> Failure {
+        let (of_over, of_under) = (&gain.recorded_unit, &gain.applied_unit);
+        Failure::failed(
+            ErrorCode::UnitUnsuitable,
+            format_args!(
+                "the static_gain of {} is in {of_over}/{of_under}, but \"{channel}\" is recorded in \"{}\": a static gain \
+                 is recorded over applied quantity; write the inverse, static_gain = \"{} {of_under}/{of_over}\"",
+                self.file,
+                named.text,
+                digits::text(over.factor() / (under.factor() * gain.value), 6),
+            ),
+        )
+    }
+
     fn by_static_gain(
         &self,
         channel: &str,
@@ -330,6 +351,11 @@ impl Stand {
         let expected =
             Unit::parse(&gain.recorded_unit).map_err(Failure::of(ErrorCode::UnitUnclear))?;
         let is_other = expected.dimension() != named.unit.dimension();
+        let applied =
+            Unit::parse(&gain.applied_unit).map_err(Failure::of(ErrorCode::UnitUnclear))?;
+        if is_other && applied.dimension() == named.unit.dimension() {
+            return Err(self.inverse_gain(channel, named, gain, [&expected, &applied]));
+        }
         if is_other || expected.ratio_of() != named.unit.ratio_of() {
             return Err(Failure::failed(
                 ErrorCode::UnitUnsuitable,

@@ -375,7 +375,8 @@ impl Stand {
             return Err(self.failed(
                 ErrorCode::IncompleteStand,
                 "the record cannot be converted to torque; add [calibration], as torque_per_volt = \"12.5 N m/V\" or \
-                 torque_per_ratio = \"25 N m/(mV/V)\", or the sections [beam], [gage] and [bridge]",
+                 torque_per_ratio = \"25 N m/(mV/V)\", or the sections [beam], [gage] and [bridge]; for a record of force, \
+                 give static_gain = \"0.08 V/N\" in [mechanics]",
             ));
         };
         let lacks = |what: &str| {

@@ -181,6 +181,14 @@ fn make_room(name: &str, document: &mut DocumentMut, entries: &[Entry]) -> Resul
             .iter()
             .any(|e| e.section == "calibration" && e.key == key)
     };
+    let is_gain = |e: &Entry| (e.section, e.key) == ("mechanics", "static_gain");
+    if entries.iter().any(is_gain) && has_conversion(document) {
+        return Err(invalid(
+            name,
+            "it converts the record to torque ([calibration] or [beam]), so that static_gain of a force cannot be written \
+             beside that; remove it, or write to another file",
+        ));
+    }
     if !entries.iter().any(|e| e.section == "calibration") {
         return Ok(());
     }

@@ -640,3 +640,78 @@ fn loads_entered_late_are_left_out() {
         assert!(off < 4.0, "{late}: {} ± {:?}", slope.value(), slope.std());
     }
 }
+
+/// Rows of a load and its reading, up and down twice.
+fn up_and_down(heading: &str, reading: impl Fn(f64) -> f64, mistyped: Option<usize>) -> Folder {
+    let mut noise = Noise(29);
+    let series = [
+        0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 40.0, 30.0, 20.0, 10.0, 0.0,
+    ];
+    let loads: Vec<f64> = [series, series].concat();
+    let row = |(i, load): (usize, &f64)| {
+        let written = if mistyped == Some(i) {
+            load - 10.0
+        } else {
+            *load
+        };
+        format!("{written},{:.6}\n", reading(*load) + 3e-4 * noise.normal())
+    };
+    let rows: String = loads.iter().enumerate().map(row).collect();
+    let folder = Folder::new();
+    folder.write("loads.csv", format!("{heading}\n{rows}"));
+    folder
+}
+
+const STATIC: [&str; 7] = [
+    "identify",
+    "static",
+    "loads.csv",
+    "--load",
+    "1",
+    "--reading",
+    "2",
+];
+
+/// A load cell of 12.5 N/V: what `identify static` writes is what `compensate` takes, and the inverse is named.
+#[test]
+fn a_load_cell_gets_its_static_gain() {
+    let folder = up_and_down("force [N],cell [V]", |load| 0.05 + 0.08 * load, None);
+    let mechanics = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"60 Hz\"\n\
+        damping_ratio = 0.02\n";
+    folder.write("stand.toml", mechanics);
+    folder
+        .run(&[&STATIC[..], &["-o", "stand.toml"]].concat())
+        .says(0, &[]);
+    let written = folder.read("stand.toml");
+    assert!(
+        written.contains("static_gain = { value = \"0.0"),
+        "{written}"
+    );
+    let volts = |i: usize| 0.05 + 0.08 * (7.0 + (i as f64 * 0.05).sin());
+    folder.write(
+        "in.csv",
+        crate::util::sampled("cell [V]", 1000.0, 2000, volts),
+    );
+    let report = folder.json(&[&crate::util::COMPENSATE[..], &["--json"]].concat());
+    assert_close(
+        report["result"]["mean"].as_f64().expect("a number"),
+        7.0,
+        1e-2,
+    );
+    folder.write(
+        "stand.toml",
+        format!("{mechanics}static_gain = \"12.5 N/V\"\n"),
+    );
+    let ran = folder.run(&[&crate::util::COMPENSATE[..], &["--force"]].concat());
+    ran.says(1, &["static_gain = \"0.08 V/N\""]);
+    // A curve, and a stand that converts to torque, have no static gain.
+    let curve = ["--degree", "3", "-o", "new.toml"];
+    folder
+        .run(&[&STATIC[..], &curve].concat())
+        .says(1, &["static_gain"]);
+    let calibrated = format!("{mechanics}[calibration]\ntorque_per_volt = \"12.5 N m/V\"\n");
+    folder.write("stand.toml", calibrated);
+    folder
+        .run(&[&STATIC[..], &["-o", "stand.toml"]].concat())
+        .says(1, &["calibration"]);
+}

@@ -47,8 +47,9 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
     if entries.is_empty() && args.findings.result.output.is_some() {
         return Err(Failure::failed(
             ErrorCode::UnitUnsuitable,
-            "a stand file takes a calibration of torque; give the load as a torque, or as a force or mass with \
-             --radius, and the reading in V, mV/V, mA, Hz, ustrain or N; or omit -o",
+            "a stand file takes a calibration of torque, or the static_gain of a force without --degree; give the load as \
+             a torque, or as a force or mass (with --radius for a torque), and the reading in V, mV/V, mA, Hz, ustrain \
+             or N; or omit -o",
         ));
     }
     recorded.add(&args.input, points.len(), None);
@@ -351,13 +352,20 @@ fn ranks(values: &[f64]) -> Vec<usize> {
 /// The entries of the stand file: the calibration in the form for the readings' unit, and the zero.
 fn entries(args: &Static, result: &Identification, units: &LoadUnits) -> Vec<Entry> {
     let source = format!("identify static: {}", args.input.shown());
+    if units.load != "N m" {
+        let gain = result.get("static_gain").filter(|_| args.degree == 1);
+        let mut entries: Vec<Entry> = gain
+            .map(|gain| entry("mechanics", "static_gain", gain, &source))
+            .into_iter()
+            .collect();
+        let zero = result.get("zero").filter(|_| !entries.is_empty());
+        entries.extend(zero.map(|zero| entry("recorder", "zero", zero, &source)));
+        return entries;
+    }
     let is_signal = |signal: &TransducerSignal| signal.usual_unit().0 == units.reading;
     let Some(signal) = TransducerSignal::ALL.into_iter().find(is_signal) else {
         return Vec::new();
     };
-    if units.load != "N m" {
-        return Vec::new();
-    }
     if args.degree > 1 {
         let point = |step: &CalibrationStep| {
             let reading = format!("{} {}", digits::text(step.reading, 9), units.reading);

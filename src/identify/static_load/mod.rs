@@ -389,6 +389,14 @@ fn constants(fit: &LoadCurve, largest: f64, units: &LoadUnits) -> Vec<NamedEstim
         NamedEstimate::new("sensitivity", per(reading, load), slope, slope_std),
         NamedEstimate::new("zero", reading.clone(), fit.values[0], fit.std[0]),
     ];
+    if load == "N" {
+        // What compensate takes for a force.
+        let unit = match reading.contains([' ', '/']) {
+            true => format!("({reading})/{load}"),
+            false => per(reading, load),
+        };
+        found.push(NamedEstimate::new("static_gain", unit, slope, slope_std));
+    }
     for (k, name) in [(2, "quadratic"), (3, "cubic")] {
         if let Some(value) = fit.values.get(k) {
             let size = largest.powi(k as i32);
