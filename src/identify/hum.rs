@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use torqcomp_dsp::harmonics::{fit, refine_fundamental};
+use torqcomp_dsp::harmonics::{Harmonics, fit, refine_fundamental};
 use torqcomp_dsp::quality::mains::mains;
 
 use super::Identification;
@@ -20,8 +20,13 @@ pub(super) struct SteadyLine {
 
 /// Relative tolerance of the mains frequency.
 const OFF: f64 = 0.006;
-/// Number of steps in which the half-length window moves from the beginning of a record to its end.
-const HALVES: usize = 3;
+/// Number of steps in which a window of half, and of a quarter, of the length moves from the beginning of a record to its end.
+const STEPS: [usize; 2] = [3, 9];
+/// Residual of the quietest quarter relative to that of the quietest half, below which the half contains a decay.
+const QUIETER: f64 = 0.3;
+/// Largest standard uncertainty of the phase over the record, in rad: beyond, the lines that are removed would be left as
+/// beats, and they are fitted together with the decay instead.
+const PHASE: f64 = 0.3;
 
 /// A uniformly sampled record without significant mains lines, which would hide where a decay begins and ends, and
 /// these lines. Unchanged if there are none, or the record is too short to detect them.
@@ -34,18 +39,34 @@ pub(super) fn without_mains(
         return (values.into(), Vec::new());
     };
     let orders: Vec<f64> = mains.lines.iter().map(|line| line.order as f64).collect();
-    // A decay leaks into the lines, so they are estimated from the quietest half of the record.
-    let half = values.len() / 2;
-    let of_half = |start: usize| {
-        let part = &values[start..start + half];
-        let fundamental = refine_fundamental(part, rate_hz, mains.nominal_hz, OFF, &orders).ok()?;
-        fit(part, rate_hz, start as f64 / rate_hz, fundamental, &orders).ok()
+    // A decay leaks into the lines, so they are estimated from the quietest half of the record, or from the quietest
+    // quarter if decays are in every half.
+    let quietest = |length: usize, count: usize| {
+        let of_part = |start: usize| {
+            let part = &values[start..start + length];
+            let nominal_hz = mains.nominal_hz;
+            let fundamental = refine_fundamental(part, rate_hz, nominal_hz, OFF, &orders).ok()?;
+            let std_hz = fundamental.std_hz.unwrap_or(0.0);
+            let fitted = fit(part, rate_hz, start as f64 / rate_hz, fundamental, &orders);
+            Some((fitted.ok()?, std_hz))
+        };
+        let starts = (0..=count).map(|k| k * (values.len() - length) / count);
+        let all = starts.filter_map(of_part);
+        all.min_by(|a, b| a.0.residual_rms.total_cmp(&b.0.residual_rms))
     };
-    let starts = (0..=HALVES).map(|k| k * (values.len() - half) / HALVES);
-    let quietest = starts
-        .filter_map(of_half)
-        .min_by(|a, b| a.residual_rms.total_cmp(&b.residual_rms));
-    let Some(fitted) = quietest else {
+    let half = quietest(values.len() / 2, STEPS[0]);
+    let quarter = quietest(values.len() / 4, STEPS[1]);
+    let is_quieter = |(part, _): &(Harmonics, f64)| {
+        let of_half = half
+            .as_ref()
+            .map_or(f64::INFINITY, |(fit, _)| fit.residual_rms);
+        part.residual_rms < QUIETER * of_half
+    };
+    let found = quarter.filter(is_quieter).or(half);
+    let length_s = values.len() as f64 / rate_hz;
+    let is_known =
+        |(_, std_hz): &(Harmonics, f64)| std::f64::consts::TAU * std_hz * length_s < PHASE;
+    let Some((fitted, _)) = found.filter(is_known) else {
         return (values.into(), Vec::new());
     };
     let at = |(i, value): (usize, &f64)| {

@@ -5,6 +5,7 @@ mod beginnings;
 mod decay;
 mod dry_friction;
 mod files;
+mod hum;
 mod late_channels;
 mod reach;
 mod response;

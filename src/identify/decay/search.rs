@@ -35,9 +35,12 @@ const OFF_HZ: f64 = 0.3;
 /// Decay exponent over a record up to which a line counts as steady.
 const STEADY: f64 = 0.3;
 
-/// Remainder of a removed line: distance in cycles over the segment, and relative amplitude.
+/// Remainder of a removed line: distance in cycles over the segment, and relative amplitude, which may be larger if it
+/// hardly decays: the line was removed with a wrong frequency, and its phase drifts away.
 const LEFT_NEAR: f64 = 2.0;
-const LEFT_SHARE: f64 = 0.3;
+const LEFT_SHARE: [f64; 2] = [0.3, 1.0];
+/// Decay exponent over the segment up to which a remainder hardly decays.
+const LEFT_DECAY: f64 = 1.0;
 
 /// Standard uncertainties by which the decay rate of a steady line may differ from zero.
 const STEADY_STD: f64 = 3.0;
@@ -121,9 +124,10 @@ pub(super) fn is_left_of<'l>(
     let near_hz = LEFT_NEAR / length_s(stretches);
     let frequency_hz = found.poles[mode].frequency_hz();
     let amplitude = largest(found, mode, stretches);
+    let hardly_decays = found.poles[mode].rate_per_s * length_s(stretches) < LEFT_DECAY;
+    let share = LEFT_SHARE[usize::from(hardly_decays)];
     lines.any(|line| {
-        (line.frequency_hz - frequency_hz).abs() < near_hz
-            && amplitude < LEFT_SHARE * line.amplitude
+        (line.frequency_hz - frequency_hz).abs() < near_hz && amplitude < share * line.amplitude
     })
 }
 
