@@ -785,3 +785,25 @@ fn a_displayed_matrix_with_a_common_factor_is_refused() {
         };
     }
 }
+
+/// Logs that are no tables: the message names what they are and how to convert them.
+#[test]
+fn logs_that_are_no_tables_are_named() {
+    let lines = rows(|t, v| format!("{{\"ts\":{t:.4},\"torque\":{v:.6}}}\n"));
+    let array = rows(|t, v| format!("{{\"ts\":{t:.4},\"torque\":{v:.6}}},\n"));
+    let labels = rows(|t, v| format!("t:{t:.4},torque:{v:.6}\n"));
+    for (text, said) in [
+        (
+            lines,
+            &["one object in each line", "jq -r '[", ".\"torque\""][..],
+        ),
+        (format!("[\n{array}{{}}]\n"), &["JSON", "jq -r '.[] | ["]),
+        (labels, &["label and value", "sed"]),
+    ] {
+        let folder = Folder::new();
+        folder.write("in.csv", text);
+        let ran = folder.run(&["inspect", "in.csv"]);
+        assert!(!ran.stderr.contains("--delimiter"), "{}", ran.stderr);
+        ran.says(1, said);
+    }
+}

@@ -715,3 +715,15 @@ fn a_load_cell_gets_its_static_gain() {
         .run(&[&STATIC[..], &["-o", "stand.toml"]].concat())
         .says(1, &["calibration"]);
 }
+
+/// Counts of a converter are calibrated as volts.
+#[test]
+fn counts_are_no_unit_and_no_pounds() {
+    let counts = |load: f64| (84_213.0 + 4e3 * load).round();
+    let folder = up_and_down("torque [N m],raw", counts, None);
+    for unit in ["counts", "count", "LSB", "digits", "bits", "ADC"] {
+        let ran = folder.run(&[&STATIC[..], &["--reading-unit", unit]].concat());
+        assert!(!ran.stderr.contains("did you mean"), "{}", ran.stderr);
+        ran.says(2, &["one count 1 V"]);
+    }
+}

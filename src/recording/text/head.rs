@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::cell::Cell;
-use super::cells_with_units::unit_of_cell;
 use super::chunks::Chunks;
 use super::commas;
 use super::display_scale;
+use super::no_table;
 use super::rows::cleaned;
 use super::table::FIRST_ROWS;
 use super::thousands;
@@ -168,7 +168,10 @@ fn find_in(head: &Head, marks: &DialectOverride) -> Result<Table, Failure> {
     }
     let lenient = tables(head, &all, lenient_row);
     let Some(best) = best(&lenient) else {
-        return Err(Failure::failed(ErrorCode::NotARecording, no_table(head)));
+        return Err(Failure::failed(
+            ErrorCode::NotARecording,
+            no_table::why(head),
+        ));
     };
     super::listing::refuse(head, &best.table)?;
     Ok(best.table.clone())
@@ -432,34 +435,4 @@ fn has_heading(head: &Head, table: &Table) -> bool {
                 )
             })
     })
-}
-
-fn no_table(head: &Head) -> String {
-    let first = head.lines.iter().find(|line| !line.text.trim().is_empty());
-    let Some(first) = first else {
-        return if head.complete {
-            "the file is empty; expected rows of numbers".to_owned()
-        } else {
-            "the first line does not end within eight megabytes; expected rows of numbers"
-                .to_owned()
-        };
-    };
-    let shown: String = first.text.trim().chars().take(60).collect();
-    let is_separator = |c: char| matches!(c, ',' | ';' | '\t');
-    let has_unit = |line: &&Line| {
-        let mut cells = line.text.split(is_separator);
-        cells.any(|cell| unit_of_cell(cell, b'.').is_some())
-    };
-    if let Some(line) = head.lines.iter().find(has_unit) {
-        return format!(
-            "no table of numbers found: \"{}\" holds units beside its numbers; only plain numbers are read. Take the units off \
-             the cells, bring each column to one unit, and write that in its heading: \"torque [N m]\"",
-            line.text.trim().chars().take(60).collect::<String>()
-        );
-    }
-    format!(
-        "no table of numbers found (the first line reads \"{shown}\"); expected at least two rows \
-         of numbers, with or without headings above. Say how the cells are separated with \
-         --delimiter and --decimal if they are unusual"
-    )
 }

@@ -24,6 +24,7 @@ mod keys;
 mod last_line;
 mod listing;
 mod makers;
+mod no_table;
 mod row_template;
 mod rows;
 mod sparse;

@@ -298,6 +298,13 @@ impl<'a> Lexer<'a> {
                 "\"grad\" is a degree to some and a gradian (0.9 degrees) to others; write deg or gon",
             ));
         }
+        if COUNTS.iter().any(|word| symbol.eq_ignore_ascii_case(word)) {
+            return Err(syntax(
+                self.text,
+                "counts of a converter have no unit; call one count 1 V in every step (--reading-unit V where they are \
+                 calibrated, --unit V where they are used), and scale those of an encoder to an angle",
+            ));
+        }
         symbols::find(symbol).ok_or_else(|| QuantityError::UnknownUnit {
             symbol: symbol.to_owned(),
             unit: self.text.to_owned(),
@@ -305,6 +312,11 @@ impl<'a> Lexer<'a> {
         })
     }
 }
+
+/// Words for the numbers of a converter or a counter.
+const COUNTS: [&str; 9] = [
+    "count", "counts", "cnt", "cts", "LSB", "digit", "digits", "bits", "ADC",
+];
 
 fn is_letter(sign: char) -> bool {
     sign.is_alphabetic() || sign == '%'
