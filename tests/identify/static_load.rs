@@ -672,6 +672,45 @@ const STATIC: [&str; 7] = [
     "2",
 ];
 
+#[test]
+fn a_mistyped_load_is_named_by_its_row() {
+    for (mistyped, said) in [
+        (Some(3), Some("row 4, load 20 N m")),
+        (Some(15), Some("row 16, ")),
+        (None, None),
+    ] {
+        let folder = up_and_down(
+            "torque [N m],bridge [V]",
+            |load| 0.05 + 0.08 * load,
+            mistyped,
+        );
+        let report = folder.json(&[&STATIC[..], &["--json"]].concat());
+        let warnings = report["warnings"].to_string();
+        assert_eq!(
+            warnings.contains("row-off-line"),
+            said.is_some(),
+            "{warnings}"
+        );
+        assert!(
+            said.is_none_or(|said| warnings.contains(said)),
+            "{warnings}"
+        );
+        assert!(!warnings.contains("degree 3"), "{warnings}");
+    }
+}
+
+/// A curved characteristic has no single row that is off.
+#[test]
+fn no_row_of_a_curve_is_off() {
+    let curve = |load: f64| 0.08 * load + 1e-5 * load.powi(3);
+    let folder = up_and_down("torque [N m],bridge [V]", curve, None);
+    let report = folder.json(&[&STATIC[..], &["--json"]].concat());
+    assert!(
+        !report["warnings"].to_string().contains("row-off-line"),
+        "{report}"
+    );
+}
+
 /// A load cell of 12.5 N/V: what `identify static` writes is what `compensate` takes, and the inverse is named.
 #[test]
 fn a_load_cell_gets_its_static_gain() {

@@ -4,6 +4,7 @@ mod filter;
 mod groups;
 mod linear;
 mod mixed;
+mod outlier;
 mod plateaus;
 mod ramp;
 mod rows;
@@ -21,7 +22,7 @@ use torqcomp_dsp::sort_by_number;
 use super::{FitQuality, Identification, NamedEstimate, rms};
 use crate::chart::{Chart, Series};
 use crate::failure::{ErrorCode, Failure};
-use crate::print::{self, plural, rounded};
+use crate::print::{plural, rounded};
 use mixed::LoadCurve;
 use plateaus::{PlateauLoads, PlateauReadings};
 use ramp::RampReadings;
@@ -166,7 +167,7 @@ pub fn identify(
     degree: usize,
     units: &LoadUnits,
 ) -> Result<Identification, Failure> {
-    let plateaus = PlateauReadings::of(points);
+    let (rows, plateaus) = (points.len(), PlateauReadings::of(points));
     let points = plateaus.as_ref().map_or(points, |p| &p.rows);
     let steps = LoadSteps::of(points);
     let is_one_weight = one_weight(points, degree, &steps)?;
@@ -197,15 +198,14 @@ pub fn identify(
     if let Some((settled, shared)) = settled.as_ref().zip(shared) {
         settled.warn(&mut result, (shared / fit.values[1]).abs());
     }
-    if let Some(steady) = &steady {
-        steady.warn(&mut result);
-    }
+    steady.iter().for_each(|steady| steady.warn(&mut result));
     if steps.is_sorted {
         rows::warn_sorted(&mut result);
     }
     result.parameters = constants(&fit, largest, units);
     let quality = quality(&curve, points, units);
-    poor(&mut result, quality.relative);
+    let of_rows = (points.len() == rows, quality.relative);
+    outlier::warn(&mut result, points, (degree, of_rows), units);
     linear::warn(&mut result, points, &curve, &steps);
     contradicted(&mut result, &fit);
     zero::drifting(&mut result, &fit, points, (largest, &units.reading));
@@ -427,22 +427,6 @@ fn draw(result: &mut Identification, points: &[Point], curve: &[f64], units: &Lo
         Chart::new("Readings and fit", &x, &y, both),
         Chart::new("Residual", &x, &y, rest),
     ]);
-}
-
-/// Residual of a calibration, relative to the range of the readings, above which the fit is poor.
-const POOR: f64 = 0.05;
-
-fn poor(result: &mut Identification, relative: f64) {
-    if relative > POOR {
-        result.warn(
-            "poor-fit",
-            format!(
-                "the residual is {} of the range of the readings: check the columns and that the rows are in the order \
-                 in which they were taken, or use --degree 3",
-                print::relative(relative, 2)
-            ),
-        );
-    }
 }
 
 /// Warns about unidentifiable terms, and the validity of the constants.

@@ -1,0 +1,126 @@
+//! A large residual: of a single row that is off the line of all others, as with a mistyped load, or of all.
+
+use super::{LoadUnits, Point};
+use crate::identify::Identification;
+use crate::print::{self, rounded};
+
+/// Minimum number of points.
+const LEAST: usize = 6;
+/// Residual without the point, relative to that with it, below which it is off, and its smallest distance in residuals
+/// of the others and in deflections at the largest load.
+const WITHOUT: f64 = 0.2;
+const FAR: (f64, f64) = (10.0, 2e-3);
+
+/// Residual of a calibration, relative to the range of the readings, above which the fit is poor.
+const POOR: f64 = 0.05;
+
+fn poor(result: &mut Identification, relative: f64) {
+    if relative > POOR {
+        result.warn(
+            "poor-fit",
+            format!(
+                "the residual is {} of the range of the readings: check the columns, the load and reading of each row, and \
+                 that the rows are in the order in which they were taken; --degree 3 helps only if the readings follow a \
+                 smooth curve (--html)",
+                print::relative(relative, 2)
+            ),
+        );
+    }
+}
+
+/// Warns about a large residual, relative to the range of the readings, or about the one point that causes it. Points are
+/// rows of the table, or means of them.
+pub(super) fn warn(
+    result: &mut Identification,
+    points: &[Point],
+    (degree, (is_by_rows, relative)): (usize, (bool, f64)),
+    units: &LoadUnits,
+) {
+    if degree != 1 || !off_line(result, points, is_by_rows, units) {
+        poor(result, relative);
+    }
+}
+
+/// Warns about the point without which all others lie on a line; returns whether there is one.
+fn off_line(
+    result: &mut Identification,
+    points: &[Point],
+    is_by_rows: bool,
+    units: &LoadUnits,
+) -> bool {
+    if points.len() < LEAST {
+        return false;
+    }
+    let without = |left_out: usize| {
+        let others = points.iter().enumerate().filter(|(i, _)| *i != left_out);
+        Line::through(others.map(|(_, point)| point))
+    };
+    let all = Line::through(points.iter());
+    let lines = (0..points.len()).map(|i| (i, without(i)));
+    let Some((place, line)) = lines.min_by(|a, b| a.1.rms.total_cmp(&b.1.rms)) else {
+        return false;
+    };
+    let point = points[place];
+    let off = (point.reading - line.at(point.load)).abs();
+    let largest = points.iter().fold(0.0_f64, |m, p| m.max(p.load.abs()));
+    let is_off = line.rms < WITHOUT * all.rms
+        && off > FAR.0 * line.rms
+        && off > FAR.1 * (line.slope * largest).abs();
+    if !is_off {
+        return false;
+    }
+    let which = match is_by_rows {
+        true => format!("row {}, ", place + 1),
+        false => String::new(),
+    };
+    result.warn(
+        "row-off-line",
+        format!(
+            "{which}load {} {}, reading {} {}, is {} {} off the line of all others, which lie within {} {} (rms): check \
+             its load and reading; the constants include it",
+            rounded(point.load, 5),
+            units.load,
+            rounded(point.reading, 5),
+            units.reading,
+            rounded(off, 2),
+            units.reading,
+            rounded(line.rms, 1),
+            units.reading
+        ),
+    );
+    true
+}
+
+/// A straight line of readings over loads.
+struct Line {
+    slope: f64,
+    /// Mean load and reading.
+    middle: (f64, f64),
+    /// Residual.
+    rms: f64,
+}
+
+impl Line {
+    fn through<'a>(points: impl Iterator<Item = &'a Point>) -> Self {
+        let pairs: Vec<(f64, f64)> = points.map(|p| (p.load, p.reading)).collect();
+        let count = pairs.len() as f64;
+        let sum = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>();
+        let middle = (sum(&|p| p.0) / count, sum(&|p| p.1) / count);
+        let products = sum(&|p| (p.0 - middle.0) * (p.1 - middle.1));
+        let squares = sum(&|p| (p.0 - middle.0).powi(2));
+        let slope = match squares > 0.0 {
+            true => products / squares,
+            false => 0.0,
+        };
+        let left = sum(&|p| (p.1 - middle.1 - slope * (p.0 - middle.0)).powi(2));
+        Self {
+            slope,
+            middle,
+            rms: (left / count).sqrt(),
+        }
+    }
+
+    fn at(&self, load: f64) -> f64 {
+        self.middle.1 + self.slope * (load - self.middle.0)
+    }
+}
