@@ -1038,3 +1038,32 @@ fn stamps_without_a_usual_step_are_interpolated() {
         inspected.stdout
     );
 }
+
+/// A microsecond counter of 32 bits and a millisecond counter of 16 that start again.
+#[test]
+fn a_counter_that_rolls_over_is_named() {
+    for (heading, bits, step, hz) in [
+        ("tick_us", 32, 100_u64, "10000"),
+        ("tick_ms", 16, 1, "1000"),
+    ] {
+        let first = (1_u64 << bits) - 1000 * step;
+        let row = |i: u64| {
+            let tick = (first + i * step) % (1 << bits);
+            format!("{tick},{:.6}\n", 5.0 + (i as f64 * 0.05).sin())
+        };
+        let folder = Folder::new();
+        let rows: String = (0..3000).map(row).collect();
+        folder.write("in.csv", format!("{heading},torque [N m]\n{rows}"));
+        let run = |more: &[&str]| folder.run(&[&COMPENSATE[..], &["--band", "100"], more].concat());
+        run(&[]).says(
+            1,
+            &[
+                &format!("counter of {bits} bits rolled over"),
+                &format!("--rate {hz}"),
+            ],
+        );
+        let ran = run(&["--rate", hz]);
+        ran.says(0, &[]);
+        assert!(!ran.stderr.contains("rate-joins-gaps"), "{}", ran.stderr);
+    }
+}

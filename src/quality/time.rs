@@ -10,7 +10,7 @@ use crate::print::plural;
 use crate::print::rounded as number;
 use crate::recording::{
     COARSE_STAMPS, Channel, REVERSED, TimeAxis, advice_for_uneven, contradicted, falls, rates_of,
-    same_stamps,
+    rolled_over, same_stamps,
 };
 use crate::warning::Warning;
 
@@ -148,6 +148,16 @@ fn counted(events: &Events) -> Option<(&Event, &Event)> {
 
 fn backwards(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
     let (first, longest) = counted(&steps.backwards)?;
+    let before_s = axis.origin_ns as f64 * 1e-9 + first.from_s;
+    let after_s = before_s + first.step_s;
+    if let Some(bits) = rolled_over(before_s, after_s, steps.typical_s) {
+        let message = format!(
+            "{whose}: the time starts again at {}: a counter of {bits} bits rolled over; if no sample is missing, give \
+             --rate HZ to continue across it",
+            axis.moment(first.from_s).short()
+        );
+        return Some(Warning::new("time-backwards", message));
+    }
     let why = if -longest.step_s > SET_BACK * steps.typical_s {
         "the clock was set back, two recordings were joined, or rows were written twice; split the file there, or \
          remove the duplicate rows"

@@ -52,6 +52,9 @@ impl JoinedBreaks {
         for (row, (before, after)) in before.zip(behind).enumerate() {
             let found = IrregularStep { row, before, after };
             let length = (after - before) / grid.step;
+            if grid.rolled_over(before, after).is_some() {
+                continue;
+            }
             if length < 0.0 {
                 self.backwards += 1;
                 self.first_backwards.get_or_insert(found);

@@ -7,6 +7,7 @@ use super::Channel;
 use super::axis::{RateFrom, TimeAxis, UNIFORM, rounding, step_of, without_rounding};
 use super::checkpoints::sharpened;
 use super::moment::Moment;
+use super::rollover::rolled_over;
 use super::shared_stamps::{refuse_shared_stamps, same_stamps};
 use super::uneven::{mean_step, no_step};
 use crate::failure::{ErrorCode, Failure};
@@ -317,11 +318,24 @@ impl StampGrid {
         stamp * self.seconds_per_unit + self.origin_ns as f64 * 1e-9
     }
 
+    /// Bits of the counter that starts again between two stamps, if one does.
+    pub(super) fn rolled_over(&self, before: f64, after: f64) -> Option<i32> {
+        let [before_s, after_s] = [before, after].map(|stamp| self.time_s(stamp));
+        rolled_over(before_s, after_s, self.step * self.seconds_per_unit)
+    }
+
     /// Text about a break, and what to do.
     pub(super) fn explain(&self, found: &IrregularStep) -> String {
         let Self { unit, step, .. } = self;
         let time = |stamp| self.time_text(stamp);
         let (before, after) = (time(found.before), time(found.after));
+        if let Some(bits) = self.rolled_over(found.before, found.after) {
+            let hz = digits::text(1.0 / (step * self.seconds_per_unit), 9);
+            return format!(
+                "the time starts again, from {before} to {after}: a counter of {bits} bits rolled over, and no sample is \
+                 missing; give --rate {hz} to continue across it"
+            );
+        }
         if found.after < found.before {
             return format!(
                 "time runs backwards, from {before} to {after}: the clock was set back, two recordings were joined, or \
