@@ -133,6 +133,15 @@ pub struct Response {
         help_heading = "Input"
     )]
     pub applied_unit: Option<String>,
+    /// Force or torque per unit of its channel, such as "444.4 N/V" for a hammer of 2.25 mV/N
+    #[arg(
+        long,
+        value_name = "QUANTITY",
+        allow_hyphen_values = true,
+        hide_short_help = true,
+        help_heading = "Input"
+    )]
+    pub torque_factor: Option<String>,
     /// Radius at which a force acts: torque = force x radius
     #[arg(long, value_name = "QUANTITY", help_heading = "Stand")]
     pub radius: Option<String>,

@@ -121,3 +121,27 @@ fn a_resonance_that_the_excitation_reaches_is_found() {
         }
     }
 }
+
+/// A hammer of 2.25 mV/N at 0.25 m.
+#[test]
+fn a_hammer_in_volts_is_scaled_by_its_factor() {
+    let torque = hits(0.002);
+    let volts: Vec<f64> = torque.iter().map(|t| t / 0.25 * 2.25e-3).collect();
+    let stand = [(412.0, 0.012, 0.08 * 0.25 / 2.25e-3)];
+    let radius = ["--radius", "0.25 m"];
+    let (_, refused) = identified("hammer [V]", &volts, &stand, &radius);
+    assert_eq!(refused.code, 2, "{}", refused.stdout);
+    assert!(
+        refused.stdout.contains("--torque-factor"),
+        "{}",
+        refused.stdout
+    );
+    let factor = ["--torque-factor", "444.444 N/V", "--radius", "0.25 m"];
+    let (_, ran) = identified("hammer [V]", &volts, &stand, &factor);
+    let report: serde_json::Value = serde_json::from_str(&ran.stdout).expect("JSON");
+    assert!(!codes(&report).contains(&"channels-shifted"), "{report}");
+    assert_close(parameter(&report, "torque_per_volt").0, 12.5, 0.02);
+    let of_frequency = ["--torque-factor", "444.444 Hz/V"];
+    let (_, wrong) = identified("hammer [V]", &volts, &stand, &of_frequency);
+    assert_eq!(wrong.code, 2, "{}", wrong.stdout);
+}

@@ -3,6 +3,7 @@
 mod arrivals;
 mod constants;
 mod decay;
+mod factor;
 mod modes;
 mod response;
 mod runup;

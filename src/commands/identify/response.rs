@@ -3,6 +3,7 @@
 use torqcomp_model::Estimate;
 
 use super::constants::{Ratios, from_ratios, from_residue};
+use super::factor::factor_of;
 use super::modes;
 use super::{FORCE, Recorded, TORQUE, deliver, entry, radius, stand_text, unit_or};
 use crate::cli::identify::Response;
@@ -90,6 +91,9 @@ fn load(args: &Response, recorded: &mut Recorded) -> Result<Vec<AlignedChannels>
         recorded.warn(quality::clipped(&read), false);
         recorded.warn(quality::repeated(&read), false);
         recorded.warn(quality::coarse_of(&read.channels), false);
+        if let Some(text) = &args.torque_factor {
+            scale(&mut read.channels[0], text)?;
+        }
         if let Some(radius_m) = radius_m {
             to_torque(&mut read.channels[0], radius_m)?;
         }
@@ -166,6 +170,27 @@ fn recorder(result: &mut Identification, source: &str) -> Vec<Entry> {
 const NOT_AT_REST: &str = "the static response of these modes is zero, but a stand file scales residues by it; choose \
     another --band";
 
+/// Converts the applied channel to a force or torque by its factor.
+fn scale(applied: &mut Channel, text: &str) -> Result<(), Failure> {
+    let (factor, dimension) = factor_of(text, (applied.recorded(), "--applied-unit"))?;
+    let unit = match dimension {
+        FORCE => "N",
+        TORQUE => "N m",
+        _ => {
+            return Err(Failure::usage(
+                ErrorCode::UnitUnsuitable,
+                format_args!(
+                    "--torque-factor {text} is no torque or force per unit of a channel; expected one such as \
+                     \"444.4 N/V\""
+                ),
+            ));
+        }
+    };
+    applied.samples.iter_mut().for_each(|v| *v *= factor);
+    applied.unit = NamedUnit::parse(unit);
+    Ok(())
+}
+
 /// Converts a force at a radius to a torque.
 fn to_torque(force: &mut Channel, radius_m: f64) -> Result<(), Failure> {
     let unit = unit_or(force.recorded(), "--applied-unit")?;
@@ -173,8 +198,16 @@ fn to_torque(force: &mut Channel, radius_m: f64) -> Result<(), Failure> {
         return Err(Failure::usage(
             ErrorCode::ConflictingArguments,
             format_args!(
-                "--radius goes with a force; --applied \"{}\" is in {}",
-                force.name, unit.text
+                "--radius goes with a force; --applied \"{}\" is in {}{}",
+                force.name,
+                unit.text,
+                match TransducerSignal::of(&unit.unit) {
+                    Some(_) => {
+                        ": give the inverse of the sensitivity of the hammer as --torque-factor, such as \"444.4 N/V\" \
+                         for 2.25 mV/N, or leave --radius out for natural frequency and damping alone"
+                    }
+                    None => "",
+                }
             ),
         ));
     }

@@ -1,7 +1,6 @@
 //! `identify runup`.
 
-use torqcomp_model::{Dimension, Unit};
-
+use super::factor::factor_of;
 use super::{FORCE, Recorded, TORQUE, deliver, entry, radius, unit_or};
 use crate::cli::identify::Runup;
 use crate::commands::Outcome;
@@ -14,7 +13,6 @@ use crate::print::short;
 use crate::quality;
 use crate::recording::{AlignedChannels, Channel};
 use crate::stand::update::Entry;
-use crate::unit::RecordedChannel;
 
 /// Runs the test.
 pub fn run(args: &Runup) -> Result<Outcome, Failure> {
@@ -101,7 +99,7 @@ fn entries(args: &Runup, result: &Identification) -> Result<Vec<Entry>, Failure>
 /// SI units of torque (rotation) or force per unit of the channel.
 fn effort_factor(args: &Runup, torque: &Channel, turning: bool) -> Result<f64, Failure> {
     let (factor, dimension) = match &args.torque_factor {
-        Some(text) => factor_of(text, torque.recorded())?,
+        Some(text) => factor_of(text, (torque.recorded(), "--torque-unit"))?,
         None => {
             let unit = unit_or(torque.recorded(), "--torque-unit")?;
             (unit.unit.factor(), unit.unit.dimension())
@@ -146,41 +144,4 @@ fn effort_factor(args: &Runup, torque: &Channel, turning: bool) -> Result<f64, F
             ),
         )),
     }
-}
-
-/// `"35.15 N/V"`: SI units of torque or force per number of the channel, and their dimension. A channel without a known
-/// unit is in the unit of the factor.
-fn factor_of(text: &str, channel: RecordedChannel) -> Result<(f64, Dimension), Failure> {
-    let wrong = || {
-        Failure::usage(
-            ErrorCode::InvalidValue,
-            format_args!(
-                "--torque-factor {text}: expected a number, a unit of torque or force, and \"/\" the unit of \
-             the channel, such as \"35.15 N/V\""
-            ),
-        )
-    };
-    let (number, units) = text.trim().split_once(' ').ok_or_else(wrong)?;
-    let number: f64 = number.parse().map_err(|_| wrong())?;
-    let (effort, per) = units.rsplit_once('/').ok_or_else(wrong)?;
-    let [effort, per] = [effort, per].map(|text| Unit::parse(text).map_err(|_| wrong()));
-    let (effort, per) = (effort?, per?);
-    if !number.is_finite() || number == 0.0 {
-        return Err(wrong());
-    }
-    let scale = match channel.unit {
-        Some(of) if of.unit.dimension() != per.dimension() => {
-            return Err(Failure::failed(
-                ErrorCode::UnitUnsuitable,
-                format_args!(
-                    "--torque-factor {text} does not match channel \"{}\", which is in {}; give torque or force per \
-                     {}, or --torque-unit if the channel is in another unit",
-                    channel.name, of.text, of.text
-                ),
-            ));
-        }
-        Some(of) => of.unit.factor() / per.factor(),
-        None => 1.0,
-    };
-    Ok((number * scale * effort.factor(), effort.dimension()))
 }
