@@ -633,6 +633,21 @@ fn ringing_far_from_the_declared_frequency_is_said() {
     }
 }
 
+/// The output of a transducer as its data sheet has it.
+#[test]
+fn ranges_of_data_sheets_are_explained() {
+    let folder = Folder::new();
+    let init = ["init", "--from", "transducer", "-o", "-", "--rated-torque"];
+    for (output, torque, said) in [
+        ("4-20 mA", "50 Nm", "\"16 mA\" and --zero \"4 mA\""),
+        ("±5 V", "50 Nm", "--sensitivity: "),
+        ("5 V", "±50 Nm", "--rated-torque: "),
+    ] {
+        let ran = folder.run(&[&init[..], &[torque, "--sensitivity", output]].concat());
+        ran.says(2, &["is a range", said]);
+    }
+}
+
 /// A mass of 2 kg under a force of two sines, with the motor current recorded in mA: a factor per A, per mA, and one
 /// for another quantity.
 #[test]

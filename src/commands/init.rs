@@ -1,6 +1,7 @@
 //! `init`: a commented stand file from the data the user has.
 
 mod questions;
+mod range;
 
 use std::fmt::Write as _;
 use std::io::{BufRead, IsTerminal, Write};
@@ -109,7 +110,7 @@ fn compose(args: &Init, mut dialogue: Option<&mut Dialogue>) -> Result<String, F
     for question in questions {
         let given = args.given(question.flag).map(str::to_owned);
         let answer = match (given, &mut dialogue) {
-            (Some(given), _) => Some(given),
+            (Some(given), _) => Some(no_range(given, question.flag)?),
             (None, Some(dialogue)) => {
                 let answer = dialogue.ask(&question.text(), |text| question.check(text))?;
                 Some(answer).filter(|answer| !answer.is_empty())
@@ -143,6 +144,17 @@ fn compose(args: &Init, mut dialogue: Option<&mut Dialogue>) -> Result<String, F
     }
     beyond_loop(&answers)?;
     Ok(page(args, from, &answers))
+}
+
+/// The value of a flag, if it is not a range.
+fn no_range(given: String, flag: &str) -> Result<String, Failure> {
+    match range::advice(&given) {
+        None => Ok(given),
+        Some(advice) => Err(Failure::usage(
+            ErrorCode::InvalidValue,
+            format_args!("--{flag}: {advice}"),
+        )),
+    }
 }
 
 /// Rejects the output at rated torque given instead of its change.

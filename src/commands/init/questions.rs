@@ -2,6 +2,8 @@
 
 use torqcomp_model::Kind;
 
+use super::range;
+
 /// One entry of the file: its place, question and meaning.
 pub(super) struct Question {
     pub(super) section: &'static str,
@@ -196,6 +198,9 @@ impl Question {
     }
 
     pub(super) fn check(&self, answer: &str) -> Result<(), String> {
+        if let Some(advice) = range::advice(answer) {
+            return Err(advice);
+        }
         match (answer, self.kind) {
             ("", _) if self.is_needed => Err(format!("required, such as {}", self.example)),
             ("", _) | (_, None) => Ok(()),
