@@ -633,6 +633,18 @@ fn ringing_far_from_the_declared_frequency_is_said() {
     }
 }
 
+/// Two hundred samples far above their noise, shorter than the filter.
+#[test]
+fn a_short_record_is_called_short() {
+    let folder = Folder::new();
+    folder.write("stand.toml", stand("").replace("60 Hz", "590 Hz"));
+    let torque = |t: f64| 9.0 + 0.5 * (TAU * 120.0 * t).sin();
+    folder.write("in.csv", over_time("T [N m]", 10_000.0, 200, torque));
+    let ran = folder.run(&COMPENSATE);
+    ran.says(0, &["too short to estimate its noise", "short-record"]);
+    assert!(!ran.stderr.contains("below the noise"), "{}", ran.stderr);
+}
+
 /// The output of a transducer as its data sheet has it.
 #[test]
 fn ranges_of_data_sheets_are_explained() {

@@ -34,6 +34,9 @@ pub(super) struct BandReport {
     pub(super) chosen_from: BandSource,
     /// Length of the part of the record that the band was chosen from, in s; `null` if it was not chosen.
     pub(super) seconds: Option<f64>,
+    /// Whether the record is too short for a spectrum to choose from.
+    #[serde(skip)]
+    pub(super) is_too_short: bool,
     /// Lines without which it would end far below.
     #[serde(skip)]
     pub(super) lines: Option<DecidingLines>,
@@ -48,7 +51,7 @@ pub(super) enum BandSource {
     Record,
     /// The first seconds of a longer one.
     FirstSeconds,
-    /// The stand alone, since the record does not rise above its noise.
+    /// The stand alone, since the record does not rise above its noise or is too short to estimate it.
     Stand,
     /// The rate at which new values come, where each is held for several samples.
     HeldSamples,
@@ -69,7 +72,7 @@ impl Wanted<'_> {
     /// The band for a stream, chosen from the first samples if no band is given.
     pub(super) fn choose(&self, stream: &mut ChannelStream) -> Result<(Band, BandReport), Failure> {
         let rate_hz = stream.rate_hz;
-        let mut lines = None;
+        let (mut lines, mut is_too_short) = (None, false);
         let (band, chosen_from, seconds) = match self.option {
             Some(BandOption::Hz(top_hz)) => (Band::new(rate_hz, top_hz), BandSource::Option, None),
             Some(BandOption::Rated) => (
@@ -98,6 +101,7 @@ impl Wanted<'_> {
                     Some(held_hz) if held_hz < top_hz => (held_hz, BandSource::HeldSamples),
                     _ => (top_hz, from),
                 };
+                is_too_short = search.is_none();
                 lines = search.and_then(|search| search.deciding_lines(top_hz));
                 (Band::new(rate_hz, top_hz), from, Some(seconds))
             }
@@ -110,6 +114,7 @@ impl Wanted<'_> {
             end_hz: band.end_hz(),
             chosen_from,
             seconds,
+            is_too_short,
             lines,
         };
         Ok((band, report))
@@ -129,6 +134,11 @@ impl BandReport {
         match self.chosen_from {
             BandSource::Option => "as given".to_owned(),
             BandSource::Rated => "the rated band".to_owned(),
+            BandSource::Stand if self.is_too_short => format!(
+                "chosen from the stand alone, up to a gain of 10, because a record of {} s is too short to estimate its \
+                 noise",
+                length(self.seconds)
+            ),
             BandSource::Stand => format!(
                 "chosen from the stand alone, up to a gain of 10, because the signal in the first {} s is below the \
                  noise",

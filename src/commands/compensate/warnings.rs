@@ -193,7 +193,8 @@ fn empty_plot(report: &CompensateReport) -> Warning {
 }
 
 fn of_length(report: &CompensateReport) -> Option<Warning> {
-    let needed = 2.0 * report.reach_s * report.rate_hz;
+    // Each end matters up to `edge_s`, most of it up to `reach_s`.
+    let needed = (2.0 * report.reach_s).max(report.edge_s) * report.rate_hz;
     ((report.samples as f64) < needed).then(|| {
         Warning::new(
             "short-record",
