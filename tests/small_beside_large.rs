@@ -174,3 +174,26 @@ fn a_spot_that_rubs_sharply_has_its_transition() {
         TAU * NATURAL_HZ / 20.0,
     );
 }
+
+/// Without the play, a recorder that clips unevenly is as good as a gage that is not linear.
+#[test]
+fn a_tie_is_settled_by_the_effects_found_later() {
+    let mut noise = Noise(36);
+    let records = [0.12, 0.1, 0.11].map(|level| {
+        let (text, _) = record(|_, _, _| 0.0, (level, 50.0), &mut noise);
+        let mut dragged = 0.0_f64;
+        changed(&text, |[_, _, y]| {
+            dragged = dragged.clamp(y - 0.06, y + 0.06);
+            dragged.clamp(-1.6, 2.1) + 0.003 * noise.normal()
+        })
+    });
+    let report = diagnosed(&records);
+    let candidates = report["candidates"].as_array().expect("a list");
+    for candidate in candidates {
+        println!(
+            "{} {} {} {}",
+            candidate["effect"], candidate["with"], candidate["status"], candidate["why"]
+        );
+        assert_ne!(candidate["status"], "indistinguishable", "{candidate}");
+    }
+}

@@ -11,6 +11,7 @@ use super::applied_noise::AppliedNoise;
 use super::decide::NEARLY;
 use super::fit::{FitEffort, FittedModel, fit};
 use super::pairs::best_pairs;
+use super::reason::Reason;
 use super::records::Records;
 use super::score::{BaseModel, ScoredModel};
 use super::search::{FOR_FIRST_EFFECT, SAME, SearchEffort, Workers, listed, try_effects};
@@ -168,6 +169,40 @@ impl SearchState {
             model.criterion() < self.after.criterion() - SAME
         });
         self.take_any(best.as_ref(), coarse)
+    }
+
+    /// Judges ties that were found before other effects were added: beside these, one of the two may be clearly better.
+    pub(super) fn judge_ties(&mut self, workers: Workers) {
+        let names = self.after.effect_names();
+        let mut worse = Vec::new();
+        for (k, candidate) in self.rounds.iter().flatten().enumerate() {
+            let Reason::Tied { best, .. } = candidate.reason else {
+                continue;
+            };
+            let is_beside_all = names
+                .iter()
+                .all(|n| *n == best || candidate.with.contains(n));
+            let place = names.iter().position(|name| *name == best);
+            let less = place.and_then(|place| self.without.get(place)?.clone());
+            let Some(less) = less.filter(|_| !is_beside_all) else {
+                continue;
+            };
+            let base = BaseModel::of(less.clone(), &self.records);
+            let is_it = |effect: &Effect| effect.name == candidate.effect.name;
+            let round = try_effects(&base, is_it, &AMONG_ALIKE, &self.records, workers.silent());
+            let instead = round.tried.into_iter().find_map(|tried| tried.model);
+            let instead = instead.unwrap_or(less);
+            if !instead.is_no_worse_than(&self.after) {
+                let best = names.join(" + ");
+                let ratio = instead.train_rms() / self.after.train_rms();
+                worse.push((k, Reason::Worse { ratio, best }));
+            }
+        }
+        for (k, reason) in worse {
+            if let Some(candidate) = self.rounds.iter_mut().flatten().nth(k) {
+                candidate.reason = reason;
+            }
+        }
     }
 
     /// Adopts a model, if there is one, and returns whether there is.

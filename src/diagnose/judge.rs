@@ -3,6 +3,7 @@
 
 use super::SearchState;
 use super::acceptance::no_gain;
+use super::fit::FittedModel;
 use super::guard_models::GuardModel;
 use super::ladder::Ladder;
 use super::noise_floor::NoiseFloor;
@@ -117,6 +118,25 @@ impl SearchState {
             let change = self.after.compared_rms() / self.before.compared_rms() - 1.0;
             self.drop_all(&Reason::NotConfirmed { change });
         }
+    }
+
+    /// Whether the compared records themselves show an effect of the model: switched off, with all other values kept, they
+    /// have more left. One that acts in the training records only improves the others by the constants.
+    pub(super) fn is_shown(&self, place: usize) -> bool {
+        let fitted = &self.after.fitted;
+        if fitted.structure.effects[place].is_line() {
+            return true;
+        }
+        let (structure, values) = fitted.structure.reduced(&fitted.values, |k| k != place);
+        let off = FittedModel {
+            free: structure.model(&values).0.free_mode(),
+            std: vec![None; values.len()],
+            structure,
+            values,
+            ..fitted.clone()
+        };
+        let off = ScoredModel::of(off, &self.records);
+        off.is_none_or(|off| no_gain(&self.after, &off).is_none())
     }
 
     /// Reverts to the plain stand.

@@ -84,6 +84,7 @@ impl SearchState {
             }
         }
         self.eliminate(workers.threads);
+        self.judge_ties(workers);
         self.ask_guards((&plain, &records), workers);
     }
 
@@ -263,7 +264,7 @@ impl SearchState {
     }
 
     /// The least needed effect, if its removal is not significant. How much an effect must explain is decided by the training
-    /// records: held-out ones of another kind may show less of it.
+    /// records: held-out ones of another kind may show less of it, but must show it.
     fn needless(&self, without: &[Option<ScoredModel>]) -> Option<usize> {
         let (after, excess) = (&self.after, self.excess());
         let noise = AppliedNoise::of(&self.records);
@@ -274,6 +275,7 @@ impl SearchState {
                 || after.insignificant_of(declared + k).is_some()
                 || after.criterion() >= less.criterion()
                 || is_training && excess.is_too_small(less, after)
+                || !is_training && excess.is_little(less, after) && !self.is_shown(declared + k)
                 || !noise.bears_out(less, after)
         };
         let all = without.iter().enumerate();

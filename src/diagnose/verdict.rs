@@ -102,9 +102,13 @@ impl PlainExcess<'_> {
         {
             return false;
         }
-        if self.is_nearly_taken(after, next) {
-            return false;
-        }
+        !self.is_nearly_taken(after, next) && self.is_little(after, next)
+    }
+
+    /// Whether further effects explain little of the whole.
+    pub fn is_little(&self, after: &ScoredModel, next: &ScoredModel) -> bool {
+        let left = after.excess_power(noise_rms(self.noise_floor));
+        let gain = after.compared_rms().powi(2) - next.compared_rms().powi(2);
         let least = match gain < MOST_OF_REST * left {
             true => SECOND,
             false => SECOND_OF_REST,
