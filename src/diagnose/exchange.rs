@@ -287,10 +287,8 @@ impl FittedModel {
     ) -> Vec<(Structure, Vec<f64>)> {
         let structure = &self.structure;
         let mut starts: Vec<(Structure, Vec<f64>)> = Vec::new();
-        let placed = structure.placed().enumerate();
-        for (_, (effect, own)) in
-            placed.filter(|(k, (e, _))| *k >= structure.declared && !e.is_line())
-        {
+        let added = structure.placed().skip(structure.declared);
+        for (effect, own) in added.filter(|(effect, _)| !effect.is_line()) {
             let chosen = chosen(effect, &self.std[own.clone()]);
             for start in effect.form.starts {
                 let mut values = self.values.clone();

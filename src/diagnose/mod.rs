@@ -100,7 +100,7 @@ pub use spectra::SpectralLine;
 pub use structure::{EffectForm, PlainStand};
 pub use surface::{ForceSurface, SurfacePlace, SurfacePoint};
 pub use units::ChannelUnits;
-pub use verdict::Verdict;
+pub use verdict::{AT_FLOOR, Verdict};
 
 /// Input of a diagnosis.
 pub struct Case {

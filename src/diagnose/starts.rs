@@ -59,8 +59,8 @@ impl Start {
     }
 }
 
-/// The starts with the smallest residuals, at most `most` and those from the backbone of free decays or a shift: each as given and with the magnitude suggested by the
-/// residual.
+/// The starts with the smallest residuals, at most `most`, each as given and with the magnitude suggested by the residual;
+/// and those from the backbone of free decays or a shift.
 pub fn best_starts(
     base: &BaseModel,
     structure: &Structure,

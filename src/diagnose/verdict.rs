@@ -37,7 +37,7 @@ impl Verdict {
 }
 
 /// Ratio of the error to the noise floor up to which nothing need be missing.
-const AT_FLOOR: f64 = 1.1;
+pub const AT_FLOOR: f64 = 1.1;
 /// Ratio of the error to an out-of-band floor above which coloured noise cannot explain it.
 const FAR_ABOVE: f64 = 1.5;
 /// Ratio up to which it may be coloured noise, if nothing else contradicts that: first-order noise with a correlation
@@ -94,8 +94,7 @@ impl PlainExcess<'_> {
     /// Whether a further effect is not named although it passes, as it explains little of the whole and of the
     /// remainder: what no model describes exactly resembles many effects a little.
     pub fn is_too_small(&self, after: &ScoredModel, next: &ScoredModel) -> bool {
-        let left = after.excess_power(noise_rms(self.noise_floor));
-        let gain = after.compared_rms().powi(2) - next.compared_rms().powi(2);
+        let (left, gain) = self.left_and_gain(after, next);
         let noise = self.noise_floor.map(|floor| floor.rms.powi(2));
         if noise.is_some_and(|noise| gain >= FAR_ABOVE_NOISE * noise)
             && gain >= GREAT_PART_OF_REST * left
@@ -105,10 +104,15 @@ impl PlainExcess<'_> {
         !self.is_nearly_taken(after, next) && self.is_little(after, next)
     }
 
+    /// Error power of a model above the noise, and what another one takes of it.
+    fn left_and_gain(&self, after: &ScoredModel, next: &ScoredModel) -> (f64, f64) {
+        let gain = after.compared_rms().powi(2) - next.compared_rms().powi(2);
+        (after.excess_power(noise_rms(self.noise_floor)), gain)
+    }
+
     /// Whether further effects explain little of the whole.
     pub fn is_little(&self, after: &ScoredModel, next: &ScoredModel) -> bool {
-        let left = after.excess_power(noise_rms(self.noise_floor));
-        let gain = after.compared_rms().powi(2) - next.compared_rms().powi(2);
+        let (left, gain) = self.left_and_gain(after, next);
         let least = match gain < MOST_OF_REST * left {
             true => SECOND,
             false => SECOND_OF_REST,
@@ -119,8 +123,7 @@ impl PlainExcess<'_> {
     /// Whether further effects explain nearly all of the measurable remainder above the noise: all of it, unless they are
     /// of stand or gage, as a slow trend explains a little of everything.
     pub fn is_nearly_taken(&self, after: &ScoredModel, next: &ScoredModel) -> bool {
-        let left = after.excess_power(noise_rms(self.noise_floor));
-        let gain = after.compared_rms().powi(2) - next.compared_rms().powi(2);
+        let (left, gain) = self.left_and_gain(after, next);
         let present = after.effect_names();
         let added = next.fitted.structure.added().iter();
         let mut further = added.filter(|own| !present.contains(&own.effect.name));

@@ -5,8 +5,8 @@ use torqcomp_model::effects::Effect;
 
 use super::checks::{load_sentences, running_sentences};
 use crate::diagnose::{
-    CandidateFit, ChangedStand, Diagnosis, ForceSurface, GuardModel, NoiseFloorSource, ShownSide,
-    Status, SurfacePlace, Verdict,
+    AT_FLOOR, CandidateFit, ChangedStand, Diagnosis, ForceSurface, GuardModel, NoiseFloorSource,
+    ShownSide, Status, SurfacePlace, Verdict,
 };
 use crate::print::{
     Report, columns, enumeration, plural, relative, rounded, unit_or_as_recorded, with_std,
@@ -65,8 +65,7 @@ impl Report for Diagnosis {
     }
 }
 
-/// Ratios of the hold-out error to the noise floor above which it is stated, and above which the floor is doubtful.
-const AT_FLOOR: f64 = 1.1;
+/// Ratio of the hold-out error to the noise floor above which the floor is doubtful.
 const ABOVE_FLOOR: f64 = 1.5;
 
 /// Ratio of a hold-out error to the noise floor; 1 if that is unknown.

@@ -1,7 +1,8 @@
 //! A large residual: of a single row that is off the line of all others, as with a mistyped load, or of all.
 
-use super::{LoadUnits, Point};
-use crate::identify::Identification;
+use super::ramp::line;
+use super::{LoadUnits, Point, value_of};
+use crate::identify::{Identification, rms};
 use crate::print::{self, rounded};
 
 /// Minimum number of points.
@@ -53,19 +54,18 @@ fn off_line(
     }
     let without = |left_out: usize| {
         let others = points.iter().enumerate().filter(|(i, _)| *i != left_out);
-        Line::through(others.map(|(_, point)| point))
+        straight(&others.map(|(_, point)| *point).collect::<Vec<_>>())
     };
-    let all = Line::through(points.iter());
+    let (_, all) = straight(points);
     let lines = (0..points.len()).map(|i| (i, without(i)));
-    let Some((place, line)) = lines.min_by(|a, b| a.1.rms.total_cmp(&b.1.rms)) else {
+    let Some((place, (line, rest))) = lines.min_by(|a, b| a.1.1.total_cmp(&b.1.1)) else {
         return false;
     };
     let point = points[place];
-    let off = (point.reading - line.at(point.load)).abs();
+    let off = (point.reading - value_of(&line, point.load)).abs();
     let largest = points.iter().fold(0.0_f64, |m, p| m.max(p.load.abs()));
-    let is_off = line.rms < WITHOUT * all.rms
-        && off > FAR.0 * line.rms
-        && off > FAR.1 * (line.slope * largest).abs();
+    let is_off =
+        rest < WITHOUT * all && off > FAR.0 * rest && off > FAR.1 * (line[1] * largest).abs();
     if !is_off {
         return false;
     }
@@ -84,43 +84,19 @@ fn off_line(
             units.reading,
             rounded(off, 2),
             units.reading,
-            rounded(line.rms, 1),
+            rounded(rest, 1),
             units.reading
         ),
     );
     true
 }
 
-/// A straight line of readings over loads.
-struct Line {
-    slope: f64,
-    /// Mean load and reading.
-    middle: (f64, f64),
-    /// Residual.
-    rms: f64,
-}
-
-impl Line {
-    fn through<'a>(points: impl Iterator<Item = &'a Point>) -> Self {
-        let pairs: Vec<(f64, f64)> = points.map(|p| (p.load, p.reading)).collect();
-        let count = pairs.len() as f64;
-        let sum = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>();
-        let middle = (sum(&|p| p.0) / count, sum(&|p| p.1) / count);
-        let products = sum(&|p| (p.0 - middle.0) * (p.1 - middle.1));
-        let squares = sum(&|p| (p.0 - middle.0).powi(2));
-        let slope = match squares > 0.0 {
-            true => products / squares,
-            false => 0.0,
-        };
-        let left = sum(&|p| (p.1 - middle.1 - slope * (p.0 - middle.0)).powi(2));
-        Self {
-            slope,
-            middle,
-            rms: (left / count).sqrt(),
-        }
-    }
-
-    fn at(&self, load: f64) -> f64 {
-        self.middle.1 + self.slope * (load - self.middle.0)
-    }
+/// Zero and slope of the straight line through points, and its residual; not a number where all loads are the same.
+fn straight(points: &[Point]) -> ([f64; 2], f64) {
+    let line = line(points);
+    let left: Vec<f64> = points
+        .iter()
+        .map(|p| p.reading - value_of(&line, p.load))
+        .collect();
+    (line, rms(&left))
 }

@@ -85,7 +85,7 @@ fn reading(points: &[Point], load: f64, all: &[f64; 2]) -> Point {
 }
 
 /// Zero and slope of the straight line through all points.
-fn line(points: &[Point]) -> [f64; 2] {
+pub(super) fn line(points: &[Point]) -> [f64; 2] {
     let count = points.len() as f64;
     let load = points.iter().map(|p| p.load).sum::<f64>() / count;
     let reading = points.iter().map(|p| p.reading).sum::<f64>() / count;
