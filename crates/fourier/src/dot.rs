@@ -10,14 +10,14 @@
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Eight independent sums, so that no addition depends on the one before.
     let mut sums = [0.0_f64; 8];
-    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest = a8.remainder().iter().zip(b8.remainder());
-    let rest: f64 = rest.map(|(x, y)| x * y).sum();
-    for (x, y) in a8.zip(b8) {
+    let (eights_a, rest_a) = a.as_chunks::<8>();
+    let (eights_b, rest_b) = b.as_chunks::<8>();
+    for (x, y) in eights_a.iter().zip(eights_b) {
         for k in 0..8 {
             sums[k] += x[k] * y[k];
         }
     }
+    let rest: f64 = rest_a.iter().zip(rest_b).map(|(x, y)| x * y).sum();
     sums.iter().sum::<f64>() + rest
 }
 

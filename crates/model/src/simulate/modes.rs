@@ -45,8 +45,18 @@ struct SteppedMode {
     at_gage: f64,
     /// `ω² g/Σ ω² g`: the change of its speed when a torque changes that of the gage by 1.
     pushed_by: f64,
-    /// `v`, and `v'` without `q ω G u`.
+    /// `v`, and `v'` without `q ω G u` and without the last change of the gage's speed.
     motion: MotionState,
+}
+
+impl SteppedMode {
+    /// The motion after the last change of the gage's speed.
+    fn pushed(&self, change: f64) -> MotionState {
+        MotionState {
+            x: self.motion.x,
+            speed: self.motion.speed + change * self.pushed_by,
+        }
+    }
 }
 
 /// Integration state of a stand with several modes.
@@ -57,12 +67,16 @@ pub(super) struct ModalIntegrator<'a> {
     /// `Σ q_k ω_k G`: the gage's speed per input.
     direct_speed: f64,
     shift: f64,
-    step_s: f64,
+    /// Nodes per second, halved.
+    half_rate_hz: f64,
     /// Change of the gage's speed at a node by a unit torque.
     impulse: f64,
+    /// Change of the gage's speed at the last node, which the modes take at the next step.
+    change: f64,
     acting: Acting<'a>,
-    /// Magnitude of the sharp dry friction.
+    /// Magnitude of the sharp dry friction, and what a unit of it takes off the gage's speed in a step.
     dry: f64,
+    stops: f64,
 }
 
 impl<'a> Stepped<'a> for ModalIntegrator<'a> {
@@ -84,31 +98,47 @@ impl<'a> Stepped<'a> for ModalIntegrator<'a> {
         let parts = motion.stand.parts().iter();
         let mut modes: Vec<SteppedMode> = parts.zip(&motion.progress.modes).map(stepped).collect();
         let acceleration: f64 = modes.iter().map(|mode| mode.pushed_by).sum();
-        for mode in &mut modes {
-            mode.pushed_by /= acceleration;
+        // Without a shape at the gage no torque acts.
+        if acceleration != 0.0 {
+            modes
+                .iter_mut()
+                .for_each(|mode| mode.pushed_by /= acceleration);
         }
         let turned = |part: &ModalPart| part.quadrature * part.mode.omega_rad_s;
         let memories = motion.progress.memories.iter().copied();
         let run = Self {
             impulse: step_s * acceleration,
+            stops: modes
+                .iter()
+                .map(|mode| mode.step.held(mode.at_gage)[1])
+                .sum(),
             modes,
             direct: motion.stand.residual() * gain,
             direct_speed: gain * motion.stand.parts().iter().map(turned).sum::<f64>(),
             shift: motion.shift,
-            step_s,
+            half_rate_hz: 0.5 / step_s,
+            change: 0.0,
             acting: motion.torques.iter().copied().zip(memories).collect(),
             dry: motion.torques.iter().filter_map(|(t, _)| t.dry()).sum(),
         };
-        let state = run.whole(&window[..3]);
+        let state = run
+            .modes
+            .iter()
+            .fold(run.direct(&window[..3]), |sum, mode| MotionState {
+                x: sum.x + mode.motion.x,
+                speed: sum.speed + mode.motion.speed,
+            });
         (run, state)
     }
 
     /// Advances by a step and applies the torques at its end.
     fn step(&mut self, state: MotionState, window: &[f64]) -> MotionState {
+        let mut moved = self.direct(&window[1..]);
         for mode in &mut self.modes {
-            mode.motion = mode.step.advance(mode.motion, window);
+            mode.motion = mode.step.advance(mode.pushed(self.change), window);
+            moved.x += mode.motion.x;
+            moved.speed += mode.motion.speed;
         }
-        let moved = self.whole(&window[1..]);
         let kicked = self.kick(moved, moved.speed - state.speed);
         self.rub(kicked)
     }
@@ -120,33 +150,28 @@ impl<'a> Stepped<'a> for ModalIntegrator<'a> {
     fn end(self, _: MotionState) -> MotionProgress {
         MotionProgress::of_modes(
             remembered(&self.acting),
-            self.modes.iter().map(|mode| mode.motion).collect(),
+            self.modes
+                .iter()
+                .map(|mode| mode.pushed(self.change))
+                .collect(),
         )
     }
 }
 
 impl ModalIntegrator<'_> {
-    /// Displacement and speed of the gage at the middle one of three nodes: all modes, and the compliance above the band.
-    fn whole(&self, nodes: &[f64]) -> MotionState {
-        let slope = (nodes[2] - nodes[0]) / (2.0 * self.step_s);
-        let direct = MotionState {
+    /// Displacement and speed of the gage at the middle one of three nodes without the motion of the modes: the compliance
+    /// above the band, and `q ω G u`.
+    fn direct(&self, nodes: &[f64]) -> MotionState {
+        let slope = (nodes[2] - nodes[0]) * self.half_rate_hz;
+        MotionState {
             x: self.direct * nodes[1],
             speed: self.direct * slope + self.direct_speed * nodes[1],
-        };
-        self.modes.iter().fold(direct, |sum, mode| MotionState {
-            x: sum.x + mode.motion.x,
-            speed: sum.speed + mode.motion.speed,
-        })
+        }
     }
 
     fn kick(&mut self, moved: MotionState, change: f64) -> MotionState {
         let kicked = kicked(&mut self.acting, moved, self.shift, change, self.impulse);
-        if kicked.speed != moved.speed {
-            let change = kicked.speed - moved.speed;
-            for mode in &mut self.modes {
-                mode.motion.speed += change * mode.pushed_by;
-            }
-        }
+        self.change = kicked.speed - moved.speed;
         kicked
     }
 
@@ -155,12 +180,7 @@ impl ModalIntegrator<'_> {
         if self.dry == 0.0 {
             return moved;
         }
-        let stops: f64 = self
-            .modes
-            .iter()
-            .map(|mode| mode.step.held(mode.at_gage)[1])
-            .sum();
-        let friction = (moved.speed / stops).clamp(-self.dry, self.dry);
+        let friction = (moved.speed / self.stops).clamp(-self.dry, self.dry);
         for mode in &mut self.modes {
             let [x, speed] = mode.step.held(-mode.at_gage * friction);
             mode.motion.x += x;
