@@ -33,7 +33,6 @@ fn record(rows: usize, channels: &[&str]) -> String {
         let turning = 9.0 * slow.cos() - 3.24 * slow.sin() + 4.7 * fast.cos() - 4.418 * fast.sin();
         let answer = applied + 2.0 * 0.98 * 0.3_f64.cos() * ringing[0] - 0.98 * 0.98 * ringing[1];
         ringing = [answer, ringing[0]];
-        let [driving, driven] = driven(t);
         let _ = write!(text, "{t:.5}");
         for channel in channels {
             let _ = match *channel {
@@ -50,8 +49,8 @@ fn record(rows: usize, channels: &[&str]) -> String {
                 "turning_Nm" => write!(text, ",{:.5}", turning + 0.1 * applied),
                 "noise_Nm" => write!(text, ",{applied:.5}"),
                 "answer_V" => write!(text, ",{answer:.5}"),
-                "driving_Nm" => write!(text, ",{driving:.5}"),
-                "driven_Nm" => write!(text, ",{:.5}", driven + 0.01 * applied),
+                "driving_Nm" => write!(text, ",{:.5}", driven(t)[0]),
+                "driven_Nm" => write!(text, ",{:.5}", driven(t)[1] + 0.01 * applied),
                 other => panic!("no channel {other}"),
             };
         }

@@ -322,20 +322,20 @@ fn add_lines(lines: &[Line], input: &mut Input) {
             let mut sin: [f64; 8] = std::array::from_fn(|k| at(k).sin());
             let mut cos: [f64; 8] = std::array::from_fn(|k| at(k).cos());
             for node in nodes {
-                let in_all = |of: [f64; 8]| {
-                    let [a, b, c, d, e, f, g, h] = of;
-                    ((a + b) + (c + d)) + ((e + f) + (g + h))
-                };
-                let part = |k: usize| size[k] * cos[k];
-                node[0] += in_all(std::array::from_fn(part));
-                node[1] -= in_all(std::array::from_fn(|k| size[k] * omega[k] * sin[k]));
-                node[2] -= in_all(std::array::from_fn(|k| part(k) * omega[k] * omega[k]));
+                // Not `array::from_fn`, which becomes a call per number here.
+                let mut parts = [[0.0; 8]; 3];
                 for k in 0..8 {
+                    parts[0][k] = size[k] * cos[k];
+                    parts[1][k] = -size[k] * omega[k] * sin[k];
+                    parts[2][k] = -size[k] * omega[k] * omega[k] * cos[k];
                     let (turn_sin, turn_cos) = turn[k];
                     (sin[k], cos[k]) = (
                         sin[k] * turn_cos + cos[k] * turn_sin,
                         cos[k] * turn_cos - sin[k] * turn_sin,
                     );
+                }
+                for (sum, [a, b, c, d, e, f, g, h]) in node.iter_mut().zip(parts) {
+                    *sum += ((a + b) + (c + d)) + ((e + f) + (g + h));
                 }
             }
         }

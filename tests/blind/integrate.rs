@@ -92,6 +92,8 @@ pub fn run(system: &dyn Dynamics, input: &Input) -> Dense {
         input,
         state: [0.0; STATES],
         mode: system.first_mode(input.between(0, 0.0)),
+        moved: [0.0; STATES],
+        rates: [[0.0; STATES]; 4],
     };
     for node in 0..nodes {
         for step in 0..STEPS {
@@ -116,6 +118,9 @@ struct Walk<'a> {
     input: &'a Input,
     state: State,
     mode: i8,
+    /// State and rates at the four stages of a step.
+    moved: State,
+    rates: [State; 4],
 }
 
 impl Walk<'_> {
@@ -143,7 +148,7 @@ impl Walk<'_> {
     }
 
     /// Position within the step where the guard turns negative, and the state there, by bisection.
-    fn switch(&self, node: usize, from: f64, to: f64) -> (f64, State) {
+    fn switch(&mut self, node: usize, from: f64, to: f64) -> (f64, State) {
         let (mut low, mut high) = (from, to);
         for _ in 0..44 {
             let middle = 0.5 * (low + high);
@@ -157,29 +162,30 @@ impl Walk<'_> {
         (high, self.runge_kutta(node, from, high))
     }
 
-    fn runge_kutta(&self, node: usize, from: f64, to: f64) -> State {
+    /// Only the states in use are touched: copies of all of them take longer than everything else.
+    fn runge_kutta(&mut self, node: usize, from: f64, to: f64) -> State {
         let count = self.system.states();
         let (h, start_s) = ((to - from) * self.input.step_s, self.input.time_s(node));
-        let slope = |part: f64, torque: f64, state: &State| {
-            let mut rates = [0.0; STATES];
-            let time_s = start_s + part * self.input.step_s;
-            self.system
-                .rates(self.mode, time_s, torque, state, &mut rates);
-            rates
-        };
-        let moved = |by: f64, rates: &State| {
-            let mut state = self.state;
-            for i in 0..count {
-                state[i] += by * rates[i];
-            }
-            state
-        };
         let middle = 0.5 * (from + to);
         let [u0, u1, u2] = [from, middle, to].map(|part| self.input.between(node, part));
-        let k1 = slope(from, u0, &self.state);
-        let k2 = slope(middle, u1, &moved(h / 2.0, &k1));
-        let k3 = slope(middle, u1, &moved(h / 2.0, &k2));
-        let k4 = slope(to, u2, &moved(h, &k3));
+        let stages = [
+            (from, 0.0, u0),
+            (middle, 0.5, u1),
+            (middle, 0.5, u1),
+            (to, 1.0, u2),
+        ];
+        for (k, (part, share, torque)) in stages.into_iter().enumerate() {
+            for i in 0..count {
+                let last = if k == 0 { 0.0 } else { self.rates[k - 1][i] };
+                self.moved[i] = self.state[i] + share * h * last;
+            }
+            let rates = &mut self.rates[k];
+            rates[..count].fill(0.0);
+            let time_s = start_s + part * self.input.step_s;
+            self.system
+                .rates(self.mode, time_s, torque, &self.moved, rates);
+        }
+        let [k1, k2, k3, k4] = &self.rates;
         let mut state = self.state;
         for i in 0..count {
             state[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
