@@ -25,18 +25,40 @@ const LEAST_RATIO: f64 = 1e-3;
 /// Minimum number of half-waves.
 const FEWEST: usize = 5;
 
-/// Estimate, from a free decay, of an effect that makes its frequency or decay rate depend on
+/// Estimate, from a free decay, of effects that make its frequency or decay rate depend on
 /// amplitude.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Backbone {
     /// `ω₀` in rad/s.
     pub omega_rad_s: f64,
     /// `δ/ω₀`.
     pub damping_ratio: f64,
-    /// Magnitude of the effect, in the record's unit and s.
-    pub size: f64,
+    /// Magnitude of each effect, in the record's unit and s.
+    pub sizes: Vec<f64>,
     /// State at the first sample.
     pub motion: MotionState,
+}
+
+/// What an effect does to an oscillation.
+struct Law {
+    /// Whether the amplitude falls by it, instead of the frequency rising.
+    is_loss: bool,
+    /// By what, per unit of its coefficient, at an amplitude.
+    at: fn(f64) -> f64,
+    /// Its magnitude per unit of the coefficient, at `ω₀`.
+    size: fn(f64) -> f64,
+}
+
+impl Law {
+    fn of(effect: &str) -> Option<Self> {
+        let (is_loss, at, size): (_, fn(f64) -> f64, fn(f64) -> f64) = match effect {
+            "cubic-stiffness" => (false, |a| a * a, |omega| 8.0 / (3.0 * omega)),
+            "coulomb-friction" => (true, |_| 1.0, |omega| PI / (2.0 * omega)),
+            "quadratic-damping" => (true, |a| a * a, |omega| 0.75 * PI / omega.powi(3)),
+            _ => return None,
+        };
+        Some(Self { is_loss, at, size })
+    }
 }
 
 /// A half-wave: its start and amplitude.
@@ -46,32 +68,22 @@ struct HalfWave {
 }
 
 impl Backbone {
-    /// Backbone of a record; `None` if it has too few half-waves or does not decay, or the named effect affects neither
-    /// frequency nor decay rate.
-    pub fn of(record: &StandRecord, effect: &str) -> Option<Self> {
+    /// Backbone of a record; `None` if it has too few half-waves or does not decay, or one of the named effects affects
+    /// neither frequency nor decay rate.
+    pub fn of(record: &StandRecord, effects: &[&str]) -> Option<Self> {
         let (waves, sign) = half_waves(record)?;
-        // The oscillation, and the effect's magnitude per coefficient of the nonlinearity.
-        let (found, over_bend): (_, fn(f64) -> f64) = match effect {
-            "cubic-stiffness" => (Swing::that_turns_faster(&waves)?, |omega| {
-                8.0 / (3.0 * omega)
-            }),
-            "coulomb-friction" => (Swing::that_loses(&waves, |_| 1.0)?, |omega| {
-                PI / (2.0 * omega)
-            }),
-            "quadratic-damping" => (Swing::that_loses(&waves, |a| a * a)?, |omega| {
-                0.75 * PI / omega.powi(3)
-            }),
-            _ => return None,
-        };
+        let laws: Vec<Law> = effects.iter().map(|e| Law::of(e)).collect::<Option<_>>()?;
+        let found = Swing::of(&waves, &laws)?;
         let [omega, amplitude] = [found.omega_rad_s, found.amplitude];
         if !(omega > 0.0 && found.rate_per_s > 0.0) {
             return None;
         }
         let (sine, cosine) = found.phase.sin_cos();
+        let sizes = laws.iter().zip(&found.bends);
         Some(Self {
             omega_rad_s: omega,
             damping_ratio: found.rate_per_s / omega,
-            size: found.bend * over_bend(omega),
+            sizes: sizes.map(|(law, bend)| bend * (law.size)(omega)).collect(),
             motion: MotionState {
                 x: sign * amplitude * sine,
                 speed: sign * (amplitude * found.turns_rad_s * cosine - found.falls_per_s * sine),
@@ -88,11 +100,12 @@ impl Backbone {
     }
 }
 
-/// An oscillation whose frequency or decay rate follows one law of amplitude.
+/// An oscillation whose frequency and decay rate follow laws of amplitude.
 struct Swing {
     omega_rad_s: f64,
     rate_per_s: f64,
-    bend: f64,
+    /// Coefficient of each law.
+    bends: Vec<f64>,
     /// Amplitude, phase, and their rates of change at the first sample.
     amplitude: f64,
     phase: f64,
@@ -101,67 +114,78 @@ struct Swing {
 }
 
 impl Swing {
-    /// Frequency that rises by `s A²`.
-    fn that_turns_faster(waves: &[HalfWave]) -> Option<Self> {
-        let levels = waves.iter().map(|w| (w.amplitude.ln(), w.start_s));
-        let [level, slope] = least_squares(levels, |t| [1.0, t])?;
-        let (start, rate) = (level.exp(), -slope);
-        let turned = |t: f64| start * start * (1.0 - (-2.0 * rate * t).exp()) / (2.0 * rate);
-        let [phase, omega, bend] = least_squares(phases(waves), |t| [1.0, t, turned(t)])?;
-        Some(Self {
-            omega_rad_s: omega,
-            rate_per_s: rate,
-            bend,
-            amplitude: start,
-            phase,
-            turns_rad_s: omega + bend * start * start,
-            falls_per_s: rate * start,
-        })
-    }
-
-    /// Amplitude that falls by `δ A + b g(A)`: linear in the cumulative sums of both up to each half-wave.
-    fn that_loses(waves: &[HalfWave], law: impl Fn(f64) -> f64) -> Option<Self> {
-        let [phase, omega] = least_squares(phases(waves), |t| [1.0, t])?;
+    /// Amplitude that falls by `δ A + Σ b g(A)` and phase that turns by `ω₀ + Σ s g(A)`: both linear in cumulative sums of
+    /// the amplitudes up to each half-wave.
+    fn of(waves: &[HalfWave], laws: &[Law]) -> Option<Self> {
         let first = waves.first()?;
-        let mut sums = [0.0; 2];
-        let mut rows = vec![(first.amplitude, sums)];
+        let of_kind = |is_loss: bool| laws.iter().filter(move |law| law.is_loss == is_loss);
+        let turned = |waves: &[HalfWave], k: usize| -> Vec<f64> {
+            let until = |law: &Law| {
+                let before = first.start_s * (law.at)(first.amplitude);
+                let pairs = waves[..=k].windows(2);
+                let each = pairs.map(|w| (w[1].start_s - w[0].start_s) * (law.at)(w[0].amplitude));
+                before + each.sum::<f64>()
+            };
+            of_kind(false).map(until).collect()
+        };
+        let phases = waves.iter().enumerate().map(|(k, wave)| {
+            let columns = [vec![1.0, wave.start_s], turned(waves, k)].concat();
+            (k as f64 * PI, columns)
+        });
+        let turns = least_squares(phases)?;
+        let omega = turns[1];
+        let mut sums = vec![0.0; 1 + of_kind(true).count()];
+        let mut rows = vec![(first.amplitude, sums.clone())];
         for pair in waves.windows(2) {
             let step_s = pair[1].start_s - pair[0].start_s;
-            let mean =
-                |of: &dyn Fn(f64) -> f64| 0.5 * (of(pair[0].amplitude) + of(pair[1].amplitude));
-            sums[0] -= step_s * mean(&|amplitude| amplitude);
-            sums[1] -= step_s * mean(&law);
-            rows.push((pair[1].amplitude, sums));
+            let mean = |of: fn(f64) -> f64| 0.5 * (of(pair[0].amplitude) + of(pair[1].amplitude));
+            sums[0] -= step_s * mean(|amplitude| amplitude);
+            for (sum, law) in sums[1..].iter_mut().zip(of_kind(true)) {
+                *sum -= step_s * mean(law.at);
+            }
+            rows.push((pair[1].amplitude, sums.clone()));
         }
-        let mut all = least_squares(rows.iter().copied(), |[a, b]| [1.0, a, b])?;
-        let least = LEAST_RATIO * omega;
-        if all[1] < least {
-            let beside = rows
-                .iter()
-                .map(|(level, sums)| (level - least * sums[0], sums[1]));
-            let [start, bend] = least_squares(beside, |b| [1.0, b])?;
-            all = [start, least, bend];
-        }
-        let [start, rate, bend] = all;
-        let falls_per_s = rate * start + bend * law(start);
+        let falls = decay(&rows, LEAST_RATIO * omega)?;
+        let (start, rate) = (falls[0], falls[1]);
+        let (mut lost, mut bent) = (falls[2..].iter(), turns[2..].iter());
+        let bends = laws.iter().map(|law| match law.is_loss {
+            true => lost.next().copied(),
+            false => bent.next().copied(),
+        });
+        let bends: Vec<f64> = bends.collect::<Option<_>>()?;
+        let at_start = |is_loss: bool| {
+            let all = laws.iter().zip(&bends);
+            let some = all.filter(|(law, _)| law.is_loss == is_loss);
+            some.map(|(law, bend)| bend * (law.at)(start)).sum::<f64>()
+        };
+        let falls_per_s = rate * start + at_start(true);
         // The amplitude is that at the middle of a half-wave.
         let before_s = first.start_s + 0.5 * PI / omega;
         Some(Self {
             omega_rad_s: omega,
             rate_per_s: rate,
-            bend,
             amplitude: start + falls_per_s * before_s,
-            phase,
-            turns_rad_s: omega,
+            phase: turns[0],
+            turns_rad_s: omega + at_start(false),
             falls_per_s,
+            bends,
         })
     }
 }
 
-/// Phase at the start of each half-wave.
-fn phases(waves: &[HalfWave]) -> impl Iterator<Item = (f64, f64)> {
-    let phases = (0..).map(|k| f64::from(k) * PI);
-    phases.zip(waves).map(|(phase, w)| (phase, w.start_s))
+/// First amplitude, decay rate (at least a given one), and the coefficients of other losses, from amplitudes with the sums of
+/// the losses so far.
+fn decay(rows: &[(f64, Vec<f64>)], least_per_s: f64) -> Option<Vec<f64>> {
+    let with_first = |sums: &[f64]| [&[1.0], sums].concat();
+    let all = least_squares(rows.iter().map(|(a, sums)| (*a, with_first(sums))))?;
+    if all[1] >= least_per_s {
+        return Some(all);
+    }
+    let rows = rows.iter();
+    let beside = rows.map(|(a, sums)| (a - least_per_s * sums[0], with_first(&sums[1..])));
+    let mut all = least_squares(beside)?;
+    all.insert(1, least_per_s);
+    Some(all)
 }
 
 /// Half-waves of a record about its mean, and the sign of the first.
@@ -203,17 +227,13 @@ fn half_waves(record: &StandRecord) -> Option<(Vec<HalfWave>, f64)> {
     (waves.len() >= FEWEST).then_some((waves, first_sign))
 }
 
-/// Least-squares coefficients of functions of the second value of each pair that give the first.
-fn least_squares<T, const N: usize>(
-    rows: impl Iterator<Item = (f64, T)>,
-    columns: impl Fn(T) -> [f64; N],
-) -> Option<[f64; N]> {
-    let (values, rows): (Vec<f64>, Vec<[f64; N]>) =
-        rows.map(|(value, at)| (value, columns(at))).unzip();
-    let matrix = DMatrix::from_row_slice(rows.len(), N, rows.as_flattened());
+/// Least-squares coefficients of columns that give the first value of each row.
+fn least_squares(rows: impl Iterator<Item = (f64, Vec<f64>)>) -> Option<Vec<f64>> {
+    let (values, rows): (Vec<f64>, Vec<Vec<f64>>) = rows.unzip();
+    let width = rows.first()?.len();
+    let matrix = DMatrix::from_row_slice(rows.len(), width, &rows.concat());
     let fit = solve(&matrix, &values, None, false).ok()?;
-    let is_determined = fit.undetermined.is_empty();
-    is_determined.then(|| fit.values.try_into().ok()).flatten()
+    fit.undetermined.is_empty().then_some(fit.values)
 }
 
 #[cfg(test)]
@@ -242,12 +262,16 @@ mod tests {
     const RATIO: f64 = 0.002;
     const RATE: f64 = OMEGA * RATIO;
 
-    fn assert_found(effect: &str, record: &StandRecord, size: f64) {
-        let found = Backbone::of(record, effect).expect("a backbone");
+    fn assert_found(effects: &[&str], record: &StandRecord, sizes: &[f64]) {
+        let found = Backbone::of(record, effects).expect("a backbone");
         assert!((found.omega_rad_s / OMEGA - 1.0).abs() < 1e-3, "{found:?}");
-        let [ratio, size] = [found.damping_ratio / RATIO, found.size / size];
-        assert!((ratio - 1.0).abs() < 0.05, "{found:?}");
-        assert!((size - 1.0).abs() < 0.05, "{found:?}");
+        assert!(
+            (found.damping_ratio / RATIO - 1.0).abs() < 0.05,
+            "{found:?}"
+        );
+        for (found_size, size) in found.sizes.iter().zip(sizes) {
+            assert!((found_size / size - 1.0).abs() < 0.05, "{found:?}");
+        }
         let x = 0.8 * 0.7_f64.sin();
         assert!((found.motion.x - x).abs() < 0.02, "{found:?}");
     }
@@ -260,8 +284,8 @@ mod tests {
             let turned = 0.64 * (1.0 - (-2.0 * RATE * t).exp()) / (2.0 * RATE);
             0.8 * (-RATE * t).exp() * (0.7 + OMEGA * t + bend * turned).sin()
         });
-        assert_found("cubic-stiffness", &record, cubic);
-        assert!(Backbone::of(&record, "backlash").is_none());
+        assert_found(&["cubic-stiffness"], &record, &[cubic]);
+        assert!(Backbone::of(&record, &["backlash"]).is_none());
     }
 
     /// `A' = −δ A − b` and `A' = −δ A − b A²` in closed form.
@@ -271,14 +295,29 @@ mod tests {
         let friction = 0.001;
         let lost = 2.0 * OMEGA * friction / PI / RATE;
         let dry = record(|t| swing(((0.8 + lost) * (-RATE * t).exp() - lost).max(0.0), t));
-        assert_found("coulomb-friction", &dry, friction);
+        assert_found(&["coulomb-friction"], &dry, &[friction]);
         let drag = 5e-6;
         let lost = 4.0 * drag * OMEGA.powi(3) / (3.0 * PI);
         let faded = |t: f64| (-RATE * t).exp();
-        let dragged = record(|t| {
-            let amplitude = 0.8 * faded(t) / (1.0 + 0.8 * lost / RATE * (1.0 - faded(t)));
-            swing(amplitude, t)
+        let amplitude = |t: f64| 0.8 * faded(t) / (1.0 + 0.8 * lost / RATE * (1.0 - faded(t)));
+        let dragged = record(|t| swing(amplitude(t), t));
+        assert_found(&["quadratic-damping"], &dragged, &[drag]);
+        // The phase beside it: ∫ A² dt in steps of 10 µs.
+        let cubic = 0.05;
+        let bend = 3.0 * cubic * OMEGA / 8.0;
+        let mut turned = vec![0.0; 8000];
+        for i in 1..8000 {
+            let steps = (0..50).map(|k| amplitude((i as f64 - 1.0 + f64::from(k) / 50.0) / 2000.0));
+            turned[i] = turned[i - 1] + steps.map(|a| a * a * 1e-5).sum::<f64>();
+        }
+        let both = record(|t| {
+            let phase = 0.7 + OMEGA * t + bend * turned[(2000.0 * t).round() as usize];
+            amplitude(t) * phase.sin()
         });
-        assert_found("quadratic-damping", &dragged, drag);
+        assert_found(
+            &["cubic-stiffness", "quadratic-damping"],
+            &both,
+            &[cubic, drag],
+        );
     }
 }

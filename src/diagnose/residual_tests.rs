@@ -101,6 +101,11 @@ impl ResidualTests {
         shares.max_by(|a, b| a.share.total_cmp(&b.share))
     }
 
+    /// Whether they show white noise only.
+    pub fn show_noise_only(&self) -> bool {
+        self.white && !self.follows_anything()
+    }
+
     /// Whether any test detects a dependence on input, motion or time.
     pub fn follows_anything(&self) -> bool {
         let is_seen = self.dependence().is_some() || self.changes();

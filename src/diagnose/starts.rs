@@ -123,26 +123,26 @@ fn from_shift(structure: &Structure) -> Option<Start> {
     Some(Start::untried(values, None))
 }
 
-/// The start from the amplitude dependence of frequency and decay rate of a free decay, for the first effect of a
-/// plain stand.
+/// The start from the amplitude dependence of frequency and decay rate of a free decay. It replaces the values of all
+/// effects: beside a missing one, those of the others may be turns away.
 fn from_backbone(structure: &Structure, plain: &[f64], training: &[StandRecord]) -> Option<Start> {
-    let [effect] = structure.effects.as_slice() else {
-        return None;
-    };
     if !training.iter().all(StandRecord::is_free) {
         return None;
     }
-    let each = training.iter().map(|r| Backbone::of(r, effect.effect.name));
+    let names: Vec<&str> = structure.names().collect();
+    let each = training.iter().map(|r| Backbone::of(r, &names));
     let each: Vec<Backbone> = each.collect::<Option<_>>()?;
     let first = each.first()?;
     let scales = &structure.context.scales;
-    let bounds = &effect.form.parameters[0];
-    let size = first.size / bounds.size(scales);
+    let effect = structure.effects.last()?;
     let mut values = plain.to_vec();
     values[0] = first.omega_rad_s / TAU / scales.natural_hz;
     values[1] = first.damping_ratio;
-    values.push(size.clamp(bounds.lower, bounds.upper));
-    values.extend(effect.form.starts[0][1..effect.moved()].iter());
+    values.extend(&effect.form.starts[0][..effect.moved()]);
+    for ((effect, own), size) in structure.placed().zip(&first.sizes) {
+        let bounds = &effect.form.parameters[0];
+        values[own.start] = (size / bounds.size(scales)).clamp(bounds.lower, bounds.upper);
+    }
     let initial = each.iter().map(Backbone::initial).collect();
     Some(Start::untried(values, Some(initial)))
 }

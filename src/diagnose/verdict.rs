@@ -120,17 +120,20 @@ impl PlainExcess<'_> {
         self.share(after, next) < least
     }
 
-    /// Whether further effects explain nearly all of the measurable remainder above the noise: all of it, unless they are
-    /// of stand or gage, as a slow trend explains a little of everything.
+    /// Whether further effects explain nearly all of the measurable remainder above the noise, or leave white noise only,
+    /// which does not depend on the error of the noise floor: all of it, unless they are of stand or gage, as a slow trend
+    /// explains a little of everything.
     pub fn is_nearly_taken(&self, after: &ScoredModel, next: &ScoredModel) -> bool {
         let (left, gain) = self.left_and_gain(after, next);
         let present = after.effect_names();
         let added = next.fitted.structure.added().iter();
         let mut further = added.filter(|own| !present.contains(&own.effect.name));
+        let is_last = is_noise(next, self.noise_floor);
+        let leaves_white =
+            || is_last && super::tests(&next.clone().with_samples()).show_noise_only();
         is_above(after, self.noise_floor)
-            && gain > NEARLY_ALL_OF_REST * left
-            && (is_noise(next, self.noise_floor)
-                || further.all(|own| own.form.stage <= Stage::Gage))
+            && (gain > NEARLY_ALL_OF_REST * left || leaves_white())
+            && (is_last || further.all(|own| own.form.stage <= Stage::Gage))
     }
 
     /// The reason for that.
@@ -261,8 +264,7 @@ impl SearchState {
 
     /// Whether only white noise is left.
     pub(super) fn is_at_noise(&self) -> bool {
-        let is_white = self.tests.white && !self.tests.follows_anything();
-        is_white && is_noise(&self.after, self.noise_floor)
+        self.tests.show_noise_only() && is_noise(&self.after, self.noise_floor)
     }
 
     /// Whether only white noise is left, and no more than noise in the training records either.
