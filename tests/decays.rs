@@ -226,6 +226,37 @@ fn drag_is_found() {
     assert!((value - stand.drag).abs() < 4.0 * std, "{value} ± {std}");
 }
 
+/// Hysteresis beside the spring leaves as little, with more parameters.
+#[test]
+fn drag_beside_a_spring_that_softens_is_no_hysteresis() {
+    let stand = Stand {
+        cubic: -0.05,
+        drag: 1.5e-6,
+        ..PLAIN
+    };
+    let (_, report) = stand.diagnosed(&["--range", "0..3"]);
+    assert_eq!(report["verdict"], "explained");
+    let mut names: Vec<&str> = report["effects"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .flat_map(Value::as_str)
+        .collect();
+    names.sort_unstable();
+    assert_eq!(names, ["cubic-stiffness", "quadratic-damping"]);
+    for (effect, want) in [
+        ("cubic-stiffness", stand.cubic),
+        ("quadratic-damping", stand.drag),
+    ] {
+        let [value, std] = parameter(&report, effect, "coefficient");
+        let off = (value - want).abs();
+        assert!(
+            off < 4.0 * std && std < 0.01 * want.abs(),
+            "{effect}: {value} ± {std}"
+        );
+    }
+}
+
 #[test]
 fn several_hits_in_one_record_are_several_decays() {
     let folder = Folder::new();

@@ -6,6 +6,7 @@ use super::fit::{FitEffort, FittedModel, fit};
 use super::records::Records;
 use super::score::{BaseModel, ScoredModel};
 use super::search::Workers;
+use super::starts::Start;
 use super::structure::{EffectForm, Structure};
 use crate::parallel::parallel;
 use torqcomp_dsp::{dot, sort_by_number};
@@ -66,11 +67,23 @@ pub fn best_pairs(
     let samples = base.scored.train_count() as f64;
     let products = Products::of(base, alone, workers.threads);
     let mut pairs = pairs(&changes, &products, samples);
-    pairs.truncate(FITTED[0]);
     let training = base.scored.fitted.with_initial_states(&records.train);
-    let mut fits: Vec<FittedModel> = parallel(pairs.len(), workers.threads, |k| {
-        let (structure, start) = pairs[k].start(base, &changes);
-        fit(structure, &start, &training, EFFORTS[0]).ok()
+    // A decay tells the magnitudes of two at once, also of a pair that changes too much to be chosen to first order.
+    let of_decays = pairs.iter().filter_map(|pair| {
+        let (structure, values) = pair.start(base, &changes);
+        let start = Start::from_backbone(&structure, values, &training)?;
+        Some((structure, start))
+    });
+    let mut starts: Vec<(Structure, Start)> = of_decays.collect();
+    pairs.truncate(FITTED[0]);
+    starts.extend(pairs.iter().map(|pair| {
+        let (structure, values) = pair.start(base, &changes);
+        (structure, Start::untried(values, None))
+    }));
+    let mut fits: Vec<FittedModel> = parallel(starts.len(), workers.threads, |k| {
+        let (structure, start) = &starts[k];
+        let records = start.in_records(&training);
+        fit(structure.clone(), &start.values, &records, EFFORTS[0]).ok()
     })
     .into_iter()
     .flatten()

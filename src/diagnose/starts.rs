@@ -38,7 +38,7 @@ pub struct Start {
 
 impl Start {
     /// A start whose residual is not known.
-    fn untried(values: Vec<f64>, initial: Option<Vec<InitialState>>) -> Self {
+    pub fn untried(values: Vec<f64>, initial: Option<Vec<InitialState>>) -> Self {
         Self {
             values,
             initial,
@@ -46,6 +46,31 @@ impl Start {
             reduction: 0.0,
             factor: 0.0,
         }
+    }
+
+    /// The start from the amplitude dependence of frequency and decay rate of free decays. It replaces the magnitudes of
+    /// all effects: beside a missing one, those of the others may be turns away.
+    pub fn from_backbone(
+        structure: &Structure,
+        mut values: Vec<f64>,
+        training: &[StandRecord],
+    ) -> Option<Self> {
+        if !training.iter().all(StandRecord::is_free) {
+            return None;
+        }
+        let names: Vec<&str> = structure.names().collect();
+        let each = training.iter().map(|r| Backbone::of(r, &names));
+        let each: Vec<Backbone> = each.collect::<Option<_>>()?;
+        let first = each.first()?;
+        let scales = &structure.context.scales;
+        values[0] = first.omega_rad_s / TAU / scales.natural_hz;
+        values[1] = first.damping_ratio;
+        for ((effect, own), size) in structure.placed().zip(&first.sizes) {
+            let bounds = &effect.form.parameters[0];
+            values[own.start] = (size / bounds.size(scales)).clamp(bounds.lower, bounds.upper);
+        }
+        let initial = each.iter().map(Backbone::initial).collect();
+        Some(Self::untried(values, Some(initial)))
     }
 
     /// The training records with the initial states of the start.
@@ -101,7 +126,10 @@ pub fn best_starts(
     }
     sort_by_number(&mut found, |start| start.left);
     found.truncate(most);
-    found.extend(from_backbone(structure, plain, training));
+    let first = effect.form.starts.first();
+    let own = first.map_or(&[][..], |own| &own[..effect.moved()]);
+    let values = [plain.as_slice(), own].concat();
+    found.extend(Start::from_backbone(structure, values, training));
     found.extend(from_shift(structure));
     found
 }
@@ -121,30 +149,6 @@ fn from_shift(structure: &Structure) -> Option<Start> {
     let mut values = context.plain_values(&late.stand);
     values.push(near.clamp(delay.lower, delay.upper));
     Some(Start::untried(values, None))
-}
-
-/// The start from the amplitude dependence of frequency and decay rate of a free decay. It replaces the values of all
-/// effects: beside a missing one, those of the others may be turns away.
-fn from_backbone(structure: &Structure, plain: &[f64], training: &[StandRecord]) -> Option<Start> {
-    if !training.iter().all(StandRecord::is_free) {
-        return None;
-    }
-    let names: Vec<&str> = structure.names().collect();
-    let each = training.iter().map(|r| Backbone::of(r, &names));
-    let each: Vec<Backbone> = each.collect::<Option<_>>()?;
-    let first = each.first()?;
-    let scales = &structure.context.scales;
-    let effect = structure.effects.last()?;
-    let mut values = plain.to_vec();
-    values[0] = first.omega_rad_s / TAU / scales.natural_hz;
-    values[1] = first.damping_ratio;
-    values.extend(&effect.form.starts[0][..effect.moved()]);
-    for ((effect, own), size) in structure.placed().zip(&first.sizes) {
-        let bounds = &effect.form.parameters[0];
-        values[own.start] = (size / bounds.size(scales)).clamp(bounds.lower, bounds.upper);
-    }
-    let initial = each.iter().map(Backbone::initial).collect();
-    Some(Start::untried(values, Some(initial)))
 }
 
 /// Start values of an effect's own parameters; for a line also the significant frequencies of the residual, for a train
