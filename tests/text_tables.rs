@@ -92,6 +92,31 @@ fn separators_and_decimal_marks() {
     );
 }
 
+/// Whole numbers and remarks beside the only column of decimal commas: with decimal points, it would be text as well.
+#[test]
+fn decimal_commas_in_one_column_are_read_beside_whole_numbers_and_remarks() {
+    for mark in [";", "\t"] {
+        let row = |t: f64, v: f64| {
+            let cells = [
+                format!("{:.0}", 1e4 * t),
+                format!("{:.0}", 1e6 * t),
+                "5".to_owned(),
+                comma(&format!("{v:.9}")),
+                "ok".to_owned(),
+            ];
+            cells.join(mark) + "\n"
+        };
+        let headings = ["Nr", "Zeit [us]", "Soll [V]", "Ist [V]", "Status"].join(mark);
+        let text = format!("{headings}\n{}", rows(row));
+        same("one comma", &text, &["--channel", "Ist"]);
+        let folder = Folder::new();
+        folder.write("in.csv", text);
+        folder
+            .run(&COMPENSATE)
+            .says(1, &["2 channels", "\"Soll\" or \"Ist\""]);
+    }
+}
+
 #[test]
 fn line_ends_marks_and_remarks() {
     let plain = rows(|t, v| format!("{t:.4},{v:.9}\n"));

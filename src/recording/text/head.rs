@@ -167,7 +167,7 @@ fn find_in(head: &Head, marks: &DialectOverride) -> Result<Table, Failure> {
         return Ok(below_numbering(head, table));
     }
     let lenient = tables(head, &all, lenient_row);
-    let Some(best) = best(&lenient) else {
+    let Some(best) = best(&lenient).map(|best| with_fewest_texts(&lenient, best)) else {
         return Err(Failure::failed(
             ErrorCode::NotARecording,
             no_table::why(head),
@@ -216,6 +216,8 @@ struct Shape {
     width: usize,
     /// Number of cells with thousands separators.
     grouped: usize,
+    /// Number of cells with texts.
+    texts: usize,
     /// Whether its first cell is a text.
     is_named: bool,
 }
@@ -253,6 +255,7 @@ fn shape(line: &str, dialect: Dialect, good: fn(usize, usize, usize) -> bool) ->
     good(numbers, texts, data).then_some(Shape {
         width,
         grouped,
+        texts,
         is_named,
     })
 }
@@ -262,6 +265,7 @@ struct Found {
     table: Table,
     rows: usize,
     grouped: usize,
+    texts: usize,
 }
 
 /// Parses a line as a row.
@@ -318,6 +322,7 @@ impl Found {
             },
             rows: rows.len(),
             grouped: rows.iter().map(|shape| shape.grouped).sum(),
+            texts: rows.iter().map(|shape| shape.texts).sum(),
         })
     }
 }
@@ -369,6 +374,17 @@ fn best(found: &[Found]) -> Option<&Found> {
             other.rows > best.rows || other.rows == best.rows && other.grouped < best.grouped;
         if better { other } else { best }
     })
+}
+
+/// The decimal mark with which the fewest cells are texts: beside a column of remarks, a column of decimal commas could
+/// pass for another one.
+fn with_fewest_texts<'a>(found: &'a [Found], best: &'a Found) -> &'a Found {
+    let delimiter = |found: &Found| found.table.dialect.delimiter;
+    let equal = |other: &&Found| other.rows == best.rows && delimiter(other) == delimiter(best);
+    let fewest = found.iter().filter(equal).min_by_key(|other| other.texts);
+    fewest
+        .filter(|other| other.texts < best.texts)
+        .unwrap_or(best)
 }
 
 /// The best dialect, unless a comma has two readings that explain all rows: then headings decide, or
