@@ -191,6 +191,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["samples-missing", "the number of samples differs from that in the header", "copy or export the file again"],
         ["screen-steps", "values are in steps of the oscilloscope's screen", "export in another mode if they could not be scaled"],
         ["truncated-last-line", "the file ends in the middle of its last line, which was dropped", "copy the file again"],
+        ["texts-in-channel", "most of the first cells of a channel are not numbers; their column was skipped", "write plain numbers there, and leave the cells without a value empty"],
         ["unassigned-headings", "the line above the rows has more words than there are columns, which have no names then", "write headings without spaces, or separate all cells by tabs or commas"],
         ["unended-last-line", "the last line has no line ending, unlike the others: its last number may be truncated", "do not trust the last sample if the file was cut off"],
         ["unit-overrides-heading", "--unit differs from the unit in the heading; --unit was used", "omit --unit if the heading is right"],

@@ -242,6 +242,61 @@ fn cells_with_units_are_refused_with_their_place() {
     folder.run(&COMPENSATE).says(1, &["line 1502", "6000 mN m"]);
 }
 
+/// A channel whose first cells are texts, beside a setpoint that is the only other column: never a torque of that.
+#[test]
+fn a_channel_with_texts_in_most_of_its_first_cells_is_asked_about() {
+    let of = |cell: &dyn Fn(usize) -> String, heading: &str| {
+        let rows: String = (0..2000).map(|i| format!("{i},5,{}\n", cell(i))).collect();
+        format!("time_ms,set [N m],{heading}\n{rows}")
+    };
+    let not_ready = |i: usize| if i < 1200 { "ERR".to_owned() } else { plain(i) };
+    let status = |i: usize| format!("{} OK", plain(i));
+    let quoted = |i: usize| format!("'{}", plain(i));
+    let folder = Folder::new();
+    for (cell, heading, shown) in [
+        (
+            &not_ready as &dyn Fn(usize) -> String,
+            "act [N m]",
+            "\"ERR\"",
+        ),
+        (&status, "act [N m]", "\"6.000000 OK\""),
+        (&quoted, "act [N m]", "\"'6.000000\""),
+        (&status, "act", "\"6.000000 OK\""),
+        (&quoted, "act", "\"'6.000000\""),
+    ] {
+        folder.write("in.csv", of(cell, heading));
+        folder.run(&COMPENSATE).says(
+            1,
+            &[
+                "line 2",
+                "column 3",
+                shown,
+                "or choose \"set\" with --channel",
+            ],
+        );
+        let wanted = [&COMPENSATE[..], &["--channel", "act"]].concat();
+        folder.run(&wanted).says(1, &["no channel \"act\"", shown]);
+        let chosen = [&COMPENSATE[..], &["--channel", "set", "--force"]].concat();
+        folder.run(&chosen).says(0, &["texts-in-channel"]);
+        let inspected = folder.run(&["inspect", "in.csv"]);
+        assert!(inspected.stdout.contains("texts-in-channel"));
+    }
+    // Words for missing numbers are none of these texts, and remarks are no channel.
+    let missing = |i: usize| match i {
+        0..1200 => "#NV".to_owned(),
+        _ => plain(i),
+    };
+    folder.write("in.csv", of(&missing, "act [N m]"));
+    let wanted = [&COMPENSATE[..], &["--channel", "act"]].concat();
+    folder
+        .run(&wanted)
+        .says(1, &["line 2", "not a finite number", "--fill"]);
+    folder.write("in.csv", of(&|i| format!("part {}", i / 100), "remark"));
+    let run = folder.run(&[&COMPENSATE[..], &["--force"]].concat());
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    assert!(!run.stderr.contains("texts-in-channel"), "{}", run.stderr);
+}
+
 /// `ros2 topic echo --csv` writes no headings: seconds and nanoseconds of the stamp, the frame, and the fields of the
 /// message.
 #[test]

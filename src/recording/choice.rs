@@ -10,7 +10,7 @@ use super::axis::step_of;
 use super::moment::Moment;
 use super::shared_stamps::refuse_shared_stamps;
 use super::stamps::TOLERABLE;
-use super::text::CELLS_WITH_UNITS;
+use super::text::is_of_skipped_column;
 use super::uneven::{advice_for_uneven, without_rate};
 use super::{Channel, Hole, HoleKind, RateFrom, Recording, check_holes, check_size, formats};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
@@ -405,10 +405,16 @@ impl Recording {
     pub(crate) fn place(&self, choice: &ChannelChoice) -> Result<usize, Failure> {
         let label = |channel| Channel::label(channel);
         let labels: Vec<Label> = self.channels.iter().map(label).collect();
-        let place = choose(&labels, choice.channel.as_deref(), choice.flags.channel)?;
-        // The requested channel may be in a column that was left out.
-        let left_out = self.warnings.iter().find(|w| w.code == CELLS_WITH_UNITS);
-        match left_out.filter(|_| choice.channel.is_none()) {
+        let skipped = self.warnings.iter().find(|w| is_of_skipped_column(w));
+        let place = choose(&labels, choice.channel.as_deref(), choice.flags.channel);
+        let place = place.map_err(|failure| match (failure.code(), skipped) {
+            (Some(code @ ErrorCode::ChannelNotFound), Some(warning)) => {
+                Failure::failed(code, format_args!("{failure}. {}", warning.message))
+            }
+            _ => failure,
+        })?;
+        // The requested channel may be in a column that was skipped.
+        match skipped.filter(|_| choice.channel.is_none()) {
             Some(warning) => Err(Failure::failed(
                 ErrorCode::ChannelUnclear,
                 format_args!(

@@ -142,12 +142,17 @@ fn fortran(text: &str, decimal: u8) -> Option<f64> {
 /// Texts for missing numbers other than those of floating point: over range, no value.
 pub fn is_non_finite(text: &str) -> bool {
     is_not_a_number(text)
-        || text.to_ascii_lowercase().starts_with("-1.#")
-        || text.to_ascii_lowercase().starts_with("1.#")
+        || has_windows_mark(text)
         || has("missing numbers", &text.to_lowercase())
         || exceeds(text)
         || is_instruments_mark(text)
         || is_over_range(text)
+}
+
+/// `1.#QNAN` and `-1,#IND`, as written by older C libraries on Windows, with the decimal mark of the system.
+fn has_windows_mark(text: &str) -> bool {
+    let number = text.strip_prefix('-').unwrap_or(text);
+    ["1.#", "1,#"].iter().any(|mark| number.starts_with(mark))
 }
 
 /// Whether a cell contains a number that instruments use for a missing value.

@@ -1,13 +1,7 @@
-//! Columns whose cells contain a unit after each number: `0.53 V`, `12 mV`.
+//! Cells that contain a unit after the number: `0.53 V`, `12 mV`.
 
 use super::cell::Cell;
-use super::head::{Head, Table};
-use super::header::{Field, Header};
 use super::units;
-use crate::warning::Warning;
-
-/// Code of the warning that such a column was left out.
-pub(in crate::recording) const CODE: &str = "cells-with-units";
 
 /// The unit after the number in a cell.
 ///
@@ -24,27 +18,6 @@ pub fn unit_of_cell(cell: &str, decimal: u8) -> Option<&str> {
         .find(|end| Cell::read(cell[..*end].trim(), decimal).is_number())?;
     let unit = cell[end..].trim();
     (!unit.is_empty() && units::read(unit).is_some()).then_some(unit)
-}
-
-/// Warnings about columns whose first cell is a number with a unit; `first` is the first row.
-pub fn left_out(head: &Head, table: &Table, first: usize, header: &Header) -> Vec<Warning> {
-    let cells = table.dialect.cells(&head.lines[first].text);
-    let fields = header.fields.iter().zip(&cells).enumerate();
-    let warning = |(place, (field, cell)): (usize, (&Field, &String))| {
-        let (heading, unit) = (&field.heading, unit_of_cell(cell, table.dialect.decimal)?);
-        Some(Warning::new(
-            CODE,
-            format!(
-                "line {}: column {} (\"{heading}\") reads \"{cell}\": only plain numbers are read, so the column was \
-                 skipped; remove the units from its cells, convert all of them to one unit, and put that in the \
-                 heading: \"{} [{unit}]\"",
-                head.number(first),
-                place + 1,
-                field.name
-            ),
-        ))
-    };
-    fields.filter_map(warning).collect()
 }
 
 #[cfg(test)]

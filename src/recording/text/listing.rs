@@ -151,7 +151,7 @@ fn variables(rows: &[Vec<String>], place: usize) -> Option<(usize, bool)> {
 fn starts_with_digit(rows: &[Vec<String>], place: usize) -> bool {
     let first = rows.first().and_then(|row| row.get(place));
     first.is_some_and(|text| {
-        text.trim_start_matches(['-', '+'])
+        text.trim_start_matches(['-', '+', '\'', '='])
             .starts_with(|c: char| c.is_ascii_digit())
     })
 }

@@ -27,6 +27,7 @@ mod makers;
 mod no_table;
 mod row_template;
 mod rows;
+mod skipped_columns;
 mod sparse;
 mod stream;
 mod summary;
@@ -48,7 +49,6 @@ use crate::recording::text::dialect::decode_line;
 use crate::warning::Warning;
 
 pub use axis_names::is_time_name;
-pub(in crate::recording) use cells_with_units::CODE as CELLS_WITH_UNITS;
 pub use chunks::{Chunks, LONGEST_LINE, Piece, too_long_a_line};
 pub use clock::days_between;
 pub use clock::{Clock, ClockOrigin};
@@ -61,6 +61,7 @@ pub use last_line::{LastLine, last_line};
 use makers::Maker;
 use rows::ColumnKind;
 pub use rows::{LineNotes, RowPlan};
+pub(in crate::recording) use skipped_columns::is_about_one as is_of_skipped_column;
 pub use stream::{BRIDGE, ChannelPlan, ChannelRows, Problem, StampColumn, StampUse, TextStream};
 pub use table::Layout;
 use table::{FIRST_ROWS, Hints, ReadTable};
@@ -147,7 +148,7 @@ impl TextFile {
         let Some(layout) = &file.layout else {
             return Ok(file);
         };
-        file.recording.warnings.extend(layout.with_units.clone());
+        file.recording.warnings.extend(layout.skipped.clone());
         file.recording.dialect = file.describe(&layout.plan.dialect.describe());
         for channel in &mut file.recording.channels {
             channel.samples.clear();
@@ -226,8 +227,8 @@ impl TextFile {
 }
 
 fn no_channel(warnings: &[Warning]) -> Failure {
-    let with_units = warnings.iter().find(|w| w.code == cells_with_units::CODE);
-    let why = with_units.map_or_else(String::new, |w| format!(". {}", w.message));
+    let skipped = warnings.iter().find(|w| is_of_skipped_column(w));
+    let why = skipped.map_or_else(String::new, |w| format!(". {}", w.message));
     Failure::failed(
         ErrorCode::NotARecording,
         format_args!("there is no column besides the time; expected one with the signal{why}"),

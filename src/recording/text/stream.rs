@@ -295,7 +295,7 @@ impl ChannelRows {
 }
 
 /// A hint if the number would be valid with the other decimal mark.
-fn other_mark(text: &str, decimal: u8) -> &'static str {
+pub(super) fn other_mark(text: &str, decimal: u8) -> &'static str {
     let other = if decimal == b'.' { b',' } else { b'.' };
     match number::cell(text, other) {
         Some(_) if decimal == b'.' => " with a decimal point (see --decimal)",

@@ -16,7 +16,7 @@ use super::header::{self, Field, Header};
 use super::last_line::{LastLine, last_line};
 use super::rows::{Column, ColumnKind, RowPlan, Rows, cleaned};
 use super::tail::Tail;
-use super::{cells_with_units, listing, sparse, summary};
+use super::{listing, skipped_columns, sparse, summary};
 use crate::failure::Failure;
 use crate::io::{Reading, names_compensated};
 use crate::recording::text::dialect::{Dialect, decode_line};
@@ -49,8 +49,8 @@ pub struct Layout {
     pub plan: RowPlan,
     /// Roles of its columns.
     pub axes: AxisPlan,
-    /// Warnings about columns with a unit after each number.
-    pub with_units: Vec<Warning>,
+    /// Warnings about columns of channels that were skipped.
+    pub skipped: Vec<Warning>,
     /// Number of bytes before its first row.
     pub offset: usize,
     /// Line of its first row.
@@ -130,6 +130,7 @@ impl Layout {
         if let Some(unit) = hints.unit {
             header.set_default_units(unit);
         }
+        let skipped = skipped_columns::warnings(&head, &table, first, &header, &kinds);
         let plan = RowPlan {
             dialect: table.dialect,
             width: table.width,
@@ -141,7 +142,7 @@ impl Layout {
         };
         let mut found = Self {
             axes: AxisPlan::default(),
-            with_units: cells_with_units::left_out(&head, &table, first, &header),
+            skipped,
             offset: head.lines[first].offset,
             line: head.number(first),
             first_rows: Rows::default(),
