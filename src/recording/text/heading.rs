@@ -17,6 +17,9 @@ pub fn split(heading: &str) -> (&str, Option<NamedUnit>) {
     {
         return (name.trim(), Some(unit));
     }
+    if let Some((name, unit)) = per(heading) {
+        return (if unit.is_some() { name } else { heading }, unit);
+    }
     if let Some((name, meaning)) = ending(heading).or_else(|| suffixed(heading))
         && let Ok(unit) = Unit::parse(meaning)
     {
@@ -41,6 +44,16 @@ fn ending(heading: &str) -> Option<(&str, &'static str)> {
     });
     let (_, name, meaning) = known.max_by_key(|(length, ..)| *length)?;
     Some((name, meaning))
+}
+
+/// Name and unit of a heading that ends in a ratio in words: `bridge_uV_per_V`. Without a unit if the ratio is none, as in
+/// `bridge_per_V`, whose last letters alone are not its unit.
+fn per(heading: &str) -> Option<(&str, Option<NamedUnit>)> {
+    let (front, below) = heading.rsplit_once("_per_")?;
+    let (name, above) = front.rsplit_once('_').unwrap_or(("", front));
+    let is_unit = Unit::parse(below).is_ok();
+    let unit = NamedUnit::parse(&format!("{above}/{below}"));
+    is_unit.then_some((name, unit.filter(|_| !name.is_empty())))
 }
 
 /// A unit after an underscore that is ambiguous, if the name confirms it: `position_m` and `motor_current_A`,
@@ -112,6 +125,12 @@ mod tests {
             ("accel_rad_s2", "accel", Some("rad/s^2")),
             ("speed_deg_s", "speed", Some("deg/s")),
             ("hit_1", "hit_1", None),
+            ("bridge_mV_per_V", "bridge", Some("mV/V")),
+            ("bridge_uV_per_V", "bridge", Some("uV/V")),
+            ("speed_rad_per_s", "speed", Some("rad/s")),
+            ("samples_per_s", "samples_per_s", None),
+            ("bridge_per_V", "bridge_per_V", None),
+            ("pulses_per_rev", "pulses_per_rev", None),
             ("arm_m", "arm_m", None),
             ("measured_position_m", "measured_position", Some("m")),
             ("motor_current_A", "motor_current", Some("A")),
