@@ -31,6 +31,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["below-rated-torque", "the torque stays below 0.5 % of the transducer's rated torque", "check unit and gain of the channel"],
         ["band-lost-in-noise", "part of the band is no larger than the record's noise, which the compensation amplifies", "choose a lower --band"],
         ["components-lost-in-noise", "components are below twice their own uncertainty", "average over a longer record, or treat them as zero"],
+        ["damping-differs", "the record's resonance at the declared frequency has another damping ratio", "determine the stand's constants with identify decay"],
         ["direction-unknown", "the speed is not significantly different from zero over part of the record, so the direction of the friction is unknown there", "treat the torque there as uncertain by the friction torque"],
         ["ends-felt-far", "the inverse of an effect such as structural damping is infinitely long, so the ends of the record affect samples far from them", "discard more at both ends, or record from rest to rest"],
         ["empty-plot", "--plot-range contains no samples", "choose a range within the record"],

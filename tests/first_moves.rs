@@ -725,3 +725,63 @@ fn a_mark_for_no_value_is_said_wherever_it_is() {
         assert!(warnings.contains("196.607 s"), "{warnings}");
     }
 }
+
+/// A torque without order through a stand of 180 Hz, whose file says another natural frequency or damping ratio.
+#[test]
+fn a_record_of_little_but_another_resonance_is_said() {
+    let mut noise = crate::noise::Noise(7);
+    let omega = TAU * 180.0 / 5000.0;
+    let (fall, cos) = (
+        (-0.02 * omega).exp(),
+        (omega * (1.0_f64 - 4e-4).sqrt()).cos(),
+    );
+    let (a, b) = (2.0 * fall * cos, -fall * fall);
+    let mut shown = [0.0; 2];
+    let motion: Vec<f64> = (0..50_000)
+        .map(|_| {
+            let next = (1.0 - a - b) * noise.normal() + a * shown[0] + b * shown[1];
+            shown = [next, shown[0]];
+            3.0 + next
+        })
+        .collect();
+    let folder = Folder::new();
+    folder.write("in.csv", sampled("T [N m]", 5000.0, 50_000, |i| motion[i]));
+    for (hz, ratio, said) in [
+        (
+            1131.0,
+            0.02,
+            Some(("resonance-elsewhere", "2 pi times as high")),
+        ),
+        (
+            28.65,
+            0.02,
+            Some(("resonance-elsewhere", "2 pi times as low")),
+        ),
+        (150.0, 0.02, Some(("resonance-elsewhere", "180 Hz"))),
+        (180.0, 0.2, Some(("damping-differs", "about 0.02, 0.2 in"))),
+        (
+            180.0,
+            0.002,
+            Some(("damping-differs", "about 0.02, 0.002 in")),
+        ),
+        (180.0, 0.02, None),
+        (181.0, 0.025, None),
+    ] {
+        let stand = stand("").replace("60 Hz", &format!("{hz} Hz"));
+        let stand = stand.replace("ratio = 0.02", &format!("ratio = {ratio}"));
+        folder.write("stand.toml", stand);
+        let report = folder.json(&[&COMPENSATE[..], &["--json", "--force"]].concat());
+        let warnings = report["warnings"].to_string();
+        match said {
+            Some((code, text)) => assert!(
+                codes(&report).contains(&code) && warnings.contains(text),
+                "{hz} {ratio}: {warnings}"
+            ),
+            None => assert!(
+                !warnings.contains("resonance-elsewhere") && !warnings.contains("damping-differs"),
+                "{hz} {ratio}: {warnings}"
+            ),
+        }
+    }
+}
+

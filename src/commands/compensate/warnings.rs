@@ -1,7 +1,7 @@
 //! Warnings about a compensated record.
 
 use torqcomp_dsp::noise::RecordNoise;
-use torqcomp_dsp::quality::resonance::other_resonance;
+use torqcomp_dsp::quality::resonance::{dominant_resonance, other_damping, other_resonance};
 use torqcomp_dsp::quality::ringing::ringing_elsewhere;
 use torqcomp_model::Mode;
 
@@ -37,7 +37,7 @@ pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Tr
     );
     report.looked_at = seen.excerpt.len();
     more.extend(of_quality(report, seen));
-    more.extend(of_resonance(report, seen));
+    more.extend(of_resonance(report, seen).or_else(|| of_damping(report, seen)));
     let levels = &report.levels;
     more.extend(levels.warnings(&seen.excerpt, report.scale, &report.unit));
     let peak = report.result.peak();
@@ -112,8 +112,10 @@ pub(super) fn modes(stand: &Stand) -> Vec<(f64, f64)> {
 
 /// A warning if the record rings elsewhere than at the declared natural frequency.
 fn of_resonance(report: &CompensateReport, seen: &Seen) -> Option<Warning> {
-    let found = other_resonance(&seen.excerpt, report.rate_hz, &report.modes)
-        .or_else(|| ringing_elsewhere(&seen.excerpt, report.rate_hz, &report.modes))?;
+    let (samples, rate_hz, modes) = (&seen.excerpt, report.rate_hz, &report.modes);
+    let found = other_resonance(samples, rate_hz, modes)
+        .or_else(|| ringing_elsewhere(samples, rate_hz, modes))
+        .or_else(|| dominant_resonance(samples, rate_hz, modes))?;
     let declared_hz = report.modes[0].0;
     Some(Warning::new(
         "resonance-elsewhere",
@@ -125,6 +127,25 @@ fn of_resonance(report: &CompensateReport, seen: &Seen) -> Option<Warning> {
             rounded(found.damping_ratio, 1),
             rounded(declared_hz, 4),
             of_turns(declared_hz, found.frequency_hz).unwrap_or_default()
+        ),
+    ))
+}
+
+/// A warning if the record rings at the declared natural frequency with another damping.
+fn of_damping(report: &CompensateReport, seen: &Seen) -> Option<Warning> {
+    let &[declared] = report.modes.as_slice() else {
+        return None;
+    };
+    let found = other_damping(&seen.excerpt, report.rate_hz, declared)?;
+    Some(Warning::new(
+        "damping-differs",
+        format!(
+            "the resonance of the record at {} Hz has a damping ratio of about {}, {} in the stand file: if it is the \
+             stand's, the result is wrong by up to their ratio near that frequency. Record a tap on the stand as it is \
+             and determine its constants with identify decay",
+            rounded(found.frequency_hz, 3),
+            rounded(found.damping_ratio, 1),
+            rounded(declared.1, 3)
         ),
     ))
 }

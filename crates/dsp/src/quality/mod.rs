@@ -16,7 +16,7 @@
 //! | repeated samples | [`repeats`](mod@repeats) |
 //! | coarse resolution | [`quantisation`](mod@quantisation) |
 //! | mains hum | [`mains`](mod@mains) |
-//! | a resonance other than the declared one | [`resonance`] |
+//! | a resonance or damping other than the declared one | [`resonance`] |
 //! | free decays far from the declared modes | [`ringing`] |
 //! | number, range, mean and standard deviation of a stream | [`sums`] |
 //! | channels that are copies of each other | [`copies`](mod@copies) |

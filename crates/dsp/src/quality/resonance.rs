@@ -41,6 +41,20 @@ const FITS: f64 = 0.5;
 const WORSE: f64 = 4.0;
 /// Smallest difference from a declared frequency.
 const APART: f64 = 0.04;
+/// Ratio of two damping ratios from which they contradict each other, that of the resolution to what the declared one
+/// needs, and least width of a broader peak in lines.
+const OTHER_DAMPING: f64 = 3.0;
+const FINER: f64 = 0.25;
+const RESOLVED: f64 = 4.0;
+/// Least part of the power of a record within so many widths of a resonance that makes up most of it, its rms difference
+/// as above, and how many times as large the squares are without the declared resonance where that shows as well.
+const MOST: f64 = 0.5;
+const WIDTHS: f64 = 3.0;
+const FITS_DOMINANT: f64 = 0.8;
+const SHOWN: f64 = 1.5;
+/// Lines occupied by the mean, and shortest block, as a power of two.
+const MEAN_LINES: f64 = 3.0;
+const SHORTEST: u32 = 8;
 
 /// The resonance of a record near the first of several declared modes (natural frequency in Hz and damping ratio), if
 /// the record shows that one instead of the declared ones.
@@ -66,12 +80,61 @@ pub fn other_resonance(
     rate_hz: f64,
     declared: &[(f64, f64)],
 ) -> Option<Resonance> {
-    let &(declared_hz, ratio) = declared.first()?;
-    let [from_hz, to_hz] = NEAR.map(|part| part * declared_hz);
-    let to_hz = to_hz.min(0.45 * rate_hz);
-    if ratio > SHARP || to_hz < 1.2 * declared_hz {
+    let &first = declared.first()?;
+    if first.1 > SHARP {
         return None;
     }
+    let is_off = |found: &Resonance| is_off(found, declared);
+    near_declared(samples, rate_hz, (first, first.1), |spectrum, _| {
+        spectrum.instead_of(first, FITS).filter(is_off)
+    })
+}
+
+/// The resonance of a record at the declared natural frequency (in Hz, with the declared damping ratio) if its damping is
+/// another one by a factor of three or more.
+///
+/// The fit is that of [`other_resonance`]. Blocks of finite length broaden a peak, so that a larger damping counts only
+/// if it is far wider than their resolution.
+///
+/// ```
+/// use torqcomp_dsp::quality::resonance::other_damping;
+/// // Hits on a body that rings at 59 Hz with a damping ratio of 0.02.
+/// let ring = |t: f64| (-7.4 * t).exp() * (370.7 * t).sin();
+/// let record: Vec<f64> = (0..40_000).map(|i| ring((f64::from(i) * 1e-3) % 1.7)).collect();
+/// let found = other_damping(&record, 1000.0, (59.0, 0.2)).unwrap();
+/// assert!((found.damping_ratio - 0.02).abs() < 0.01);
+/// assert_eq!(other_damping(&record, 1000.0, (59.0, 0.02)), None);
+/// ```
+#[must_use]
+pub fn other_damping(samples: &[f64], rate_hz: f64, declared: (f64, f64)) -> Option<Resonance> {
+    let (declared_hz, ratio) = declared;
+    // A record may be too short for the blocks of the declared width.
+    let finest = 16.0 * (BLOCKS + 1) as f64 * rate_hz / (2.0 * declared_hz * samples.len() as f64);
+    let resolved = finest.max(FINER * ratio);
+    near_declared(
+        samples,
+        rate_hz,
+        (declared, resolved),
+        |spectrum, step_hz| {
+            let found = spectrum.instead_of(declared, FITS)?;
+            let times = found.damping_ratio / ratio;
+            let is_resolved = 2.0 * found.damping_ratio * declared_hz > RESOLVED * step_hz;
+            let is_other = times < 1.0 / OTHER_DAMPING || times > OTHER_DAMPING && is_resolved;
+            let is_there = (found.frequency_hz - declared_hz).abs() < APART * declared_hz;
+            (is_there && is_other).then_some(found)
+        },
+    )
+}
+
+/// What is found in spectra around the declared frequency, the longest blocks first; also gives their frequency step. The
+/// blocks resolve a resonance of this damping ratio.
+fn near_declared(
+    samples: &[f64],
+    rate_hz: f64,
+    ((declared_hz, _), ratio): ((f64, f64), f64),
+    find: impl Fn(&LogSpectrum, f64) -> Option<Resonance>,
+) -> Option<Resonance> {
+    let [from_hz, to_hz] = around(declared_hz, rate_hz)?;
     let longest = (2 * samples.len() / (BLOCKS + 1)).checked_ilog2()?;
     // Sharp peaks need long blocks; broad ones have less variance with short blocks.
     let finest = (16.0 * rate_hz / (2.0 * ratio * declared_hz)).log2().ceil() as u32;
@@ -79,8 +142,74 @@ pub fn other_resonance(
     powers.filter(|power| *power <= longest).find_map(|power| {
         let density = welch(samples, rate_hz, 1 << power).ok()?;
         let spectrum = LogSpectrum::of(&density, [from_hz, to_hz])?;
-        spectrum.other_resonance(declared)
+        find(&spectrum, density.step_hz)
     })
+}
+
+/// The range examined around a frequency; `None` if too little of it is in the spectrum.
+fn around(hz: f64, rate_hz: f64) -> Option<[f64; 2]> {
+    let [from_hz, to_hz] = NEAR.map(|part| part * hz);
+    let to_hz = to_hz.min(0.45 * rate_hz);
+    (to_hz > 1.2 * hz).then_some([from_hz, to_hz])
+}
+
+/// Whether a resonance is none of the declared modes.
+fn is_off(found: &Resonance, declared: &[(f64, f64)]) -> bool {
+    let mut all = declared.iter();
+    all.all(|(hz, _)| (found.frequency_hz - hz).abs() > APART * hz)
+}
+
+/// The resonance that makes up most of a record, wherever it is, unless it is a declared mode or the record shows the first
+/// of those as well. The fit is that of [`other_resonance`], around the strongest peak.
+///
+/// ```
+/// use torqcomp_dsp::quality::resonance::dominant_resonance;
+/// // Hits on a body that rings at 59 Hz with a damping ratio of 0.02, declared in rad/s.
+/// let ring = |t: f64| (-7.4 * t).exp() * (370.7 * t).sin();
+/// let record: Vec<f64> = (0..40_000).map(|i| ring((f64::from(i) * 1e-3) % 1.7)).collect();
+/// let found = dominant_resonance(&record, 1000.0, &[(370.7, 0.02)]).unwrap();
+/// assert!((found.frequency_hz - 59.0).abs() < 0.5);
+/// assert_eq!(dominant_resonance(&record, 1000.0, &[(59.5, 0.02)]), None);
+/// ```
+#[must_use]
+pub fn dominant_resonance(
+    samples: &[f64],
+    rate_hz: f64,
+    declared: &[(f64, f64)],
+) -> Option<Resonance> {
+    let &first = declared.first()?;
+    dominant(samples, rate_hz, first).filter(|found| is_off(found, declared))
+}
+
+fn dominant(samples: &[f64], rate_hz: f64, declared: (f64, f64)) -> Option<Resonance> {
+    let longest = (2 * samples.len() / (BLOCKS + 1)).checked_ilog2()?;
+    let powers = (longest.saturating_sub(RESOLUTIONS)..=longest).rev();
+    powers.filter(|power| *power >= SHORTEST).find_map(|power| {
+        let density = welch(samples, rate_hz, 1 << power).ok()?;
+        let least_hz = MEAN_LINES * density.step_hz;
+        // Power per relative bandwidth: a drift has large densities at the lowest frequencies.
+        let (peak_hz, _) = density
+            .between(least_hz, 0.5 * rate_hz)
+            .max_by(|a, b| (a.0 * a.1).total_cmp(&(b.0 * b.1)))?;
+        let spectrum = LogSpectrum::of(&density, around(peak_hz, rate_hz)?)?;
+        let found = spectrum.instead_of(declared, FITS_DOMINANT)?;
+        let power = |from_hz, to_hz| density.between(from_hz, to_hz).map(|(_, p)| p).sum::<f64>();
+        let reach_hz = WIDTHS * 2.0 * found.damping_ratio * found.frequency_hz;
+        let own = power(found.frequency_hz - reach_hz, found.frequency_hz + reach_hz);
+        let is_dominant = own > MOST * power(least_hz, 0.5 * rate_hz);
+        (is_dominant && !shows(&density, rate_hz, declared)).then_some(found)
+    })
+}
+
+/// Whether a spectrum has a peak at the declared resonance.
+fn shows(density: &Density, rate_hz: f64, (frequency_hz, damping_ratio): (f64, f64)) -> bool {
+    let range = around(frequency_hz, rate_hz);
+    let spectrum = range.and_then(|range| LogSpectrum::of(density, range));
+    let declared = Resonance {
+        frequency_hz,
+        damping_ratio,
+    };
+    spectrum.is_some_and(|s| SHOWN * s.misfit(Some(&declared)) < s.misfit(None))
 }
 
 /// Logarithm of a spectrum in bands, without the smooth functions that an input may have.
@@ -197,9 +326,13 @@ impl LogSpectrum {
         best
     }
 
-    fn other_resonance(&self, declared: &[(f64, f64)]) -> Option<Resonance> {
+    /// The resonance that fits, within this rms difference, far better than none and than the declared one.
+    fn instead_of(
+        &self,
+        (frequency_hz, damping_ratio): (f64, f64),
+        most: f64,
+    ) -> Option<Resonance> {
         let (found, misfit) = self.best();
-        let (frequency_hz, damping_ratio) = declared[0];
         let as_declared = Resonance {
             frequency_hz,
             damping_ratio,
@@ -211,12 +344,11 @@ impl LogSpectrum {
                 .iter()
                 .any(|at| (at - hz).abs() < 0.5 * width_hz)
         };
-        let is_off = |(hz, _): &(f64, f64)| (found.frequency_hz - hz).abs() > APART * hz;
-        let fits = misfit < FITS * FITS
+        let fits = misfit < most * most
             && WORSE * misfit < self.misfit(None)
             && WORSE * misfit < self.misfit(Some(&as_declared));
         let is_resonance = found.damping_ratio < WIDEST && shows(-1.0) && shows(1.0);
-        (fits && is_resonance && declared.iter().all(is_off)).then_some(found)
+        (fits && is_resonance).then_some(found)
     }
 }
 
@@ -263,6 +395,33 @@ mod tests {
                     let found = other_resonance(&record, 20_000.0, &[(declared * hz, ratio)]);
                     assert_eq!(found, None);
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn a_resonance_that_makes_up_the_record_is_found_far_from_the_declared_one() {
+        for seed in 0..10 {
+            let record = rung(&noise(seed, 65_536), 20_000.0, 590.0, 0.02);
+            for declared in [590.0 * TAU, 590.0 / TAU, 59.0, 5900.0] {
+                let found = dominant_resonance(&record, 20_000.0, &[(declared, 0.02)]);
+                let found = found.unwrap_or_else(|| panic!("{seed} {declared}"));
+                assert!((found.frequency_hz / 590.0 - 1.0).abs() < 0.02, "{found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_wrong_damping_ratio_is_found() {
+        for seed in 0..10 {
+            for ratio in [0.02, 0.03] {
+                let record = rung(&noise(seed, 65_536), 20_000.0, 590.0, ratio);
+                for (times, is_found) in [(0.1, true), (0.7, false), (1.0, false), (1.4, false)] {
+                    let found = other_damping(&record, 20_000.0, (590.0, times * ratio));
+                    assert_eq!(found.is_some(), is_found, "{seed} {ratio} {times}");
+                }
+                let found = other_damping(&record, 20_000.0, (590.0, 10.0 * ratio)).unwrap();
+                assert!((found.damping_ratio / ratio - 1.0).abs() < 0.4, "{found:?}");
             }
         }
     }
