@@ -125,6 +125,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["not-viscous", "another damping law fits the envelope better than viscous damping", "look for the cause with diagnose"],
         ["one-direction", "the body moves in one direction only: dry friction and offset cannot be separated", "run it both ways"],
         ["one-series", "the loads were applied only once, so the repeatability is unknown", "repeat the series"],
+        ["calibration-differs", "a calibration with weights differs by more than 10 % from that of the stand file", "check the lever arm, gravity and units of the loads, and the gain of the amplifier"],
         ["row-off-line", "one row of known loads is far off the line of all others", "check the load and the reading of that row"],
         ["rows-sorted", "the rows of loads are sorted by load and reading", "restore the order in which they were taken"],
         ["still-settling", "readings had not settled when the load was changed: their settled values are extrapolated", "keep each load for longer"],

@@ -36,7 +36,7 @@ pub use file::{calibration_of, parse, read, recorder_of, text};
 pub(crate) use gain::gain_differs;
 pub use measured::{AT_TORQUE, CalibrationLaw, MeasuredCalibration};
 pub use modes::{DeclaredMode, MODE_CORRELATIONS};
-pub use rated::off_rated;
+pub use rated::{is_far_beyond_rated, off_rated};
 pub use refine::{Refined, refine, si_unit};
 pub use signal::TransducerSignal;
 pub use uncertainty::{ConstantStd, TorqueStd};

@@ -24,7 +24,7 @@ pub fn off_rated(largest: f64, rated: Option<f64>, unit: &str) -> Option<Warning
             ),
         ));
     }
-    if largest <= FAR_BEYOND * rated {
+    if !is_far_beyond_rated(largest, rated) {
         return None;
     }
     Some(Warning::new(
@@ -37,4 +37,9 @@ pub fn off_rated(largest: f64, rated: Option<f64>, unit: &str) -> Option<Warning
             short(rated)
         ),
     ))
+}
+
+/// Whether a torque is far above the rated one.
+pub fn is_far_beyond_rated(largest: f64, rated: f64) -> bool {
+    largest > FAR_BEYOND * rated
 }

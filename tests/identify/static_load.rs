@@ -766,3 +766,24 @@ fn counts_are_no_unit_and_no_pounds() {
         ran.says(2, &["one count 1 V"]);
     }
 }
+/// A slip in the arm, seen from the calibration in the stand file and its rated torque.
+#[test]
+fn a_calibration_far_from_that_of_the_stand_file_is_said() {
+    let reading = |load: f64| 0.05 + 0.08 * load;
+    let folder = up_and_down("force [N],bridge [V]", reading, None);
+    let stand = "schema = \"torqcomp.stand/1\"\n[calibration]\ntorque_per_volt = \"3.125 N m/V\"\n\
+                 rated_torque = \"10 N m\"\n";
+    for (radius, codes) in [
+        ("250 mm", &[][..]),
+        ("250 cm", &["calibration-differs", "beyond-rated-torque"]),
+    ] {
+        folder.write("stand.toml", stand);
+        let more = ["--radius", radius, "-o", "stand.toml", "--json"];
+        let report = folder.json(&[&STATIC[..], &more, &["--force"]].concat());
+        for code in ["calibration-differs", "beyond-rated-torque"] {
+            let is_said = crate::util::codes(&report).contains(&code);
+            assert_eq!(is_said, codes.contains(&code), "{radius}: {report}");
+        }
+    }
+}
+

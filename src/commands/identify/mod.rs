@@ -5,13 +5,14 @@ mod constants;
 mod decay;
 mod factor;
 mod modes;
+mod replaced;
 mod response;
 mod runup;
 mod static_load;
 
 use std::path::{Path, PathBuf};
 
-use torqcomp_model::{Dimension, Kind, UnitSystem};
+use torqcomp_model::{Dimension, Kind, Unit, UnitSystem};
 
 use super::{Outcome, conclude, same};
 use crate::cli::identify::{Findings, Identify, Test};
@@ -205,6 +206,13 @@ fn unit_or(channel: RecordedChannel, flag: &str) -> Result<NamedUnit, Failure> {
             ),
         }
     })
+}
+
+/// A unit with its masses read as weights, if that makes it one of this dimension: `kgf cm` for `kg cm` as a torque.
+fn weight_as(unit: &NamedUnit, dimension: Dimension) -> Option<String> {
+    let [force, _] = Unit::readings_of_weight(&unit.text)?;
+    let is_weight = |text: &String| Unit::parse(text).is_ok_and(|u| u.dimension() == dimension);
+    Some(force).filter(|force| unit.unit.dimension() != dimension && is_weight(force))
 }
 
 /// Reads a quantity from the command line that must be greater than 0.

@@ -5,7 +5,9 @@ use std::collections::HashMap;
 use torqcomp_decimal::digits;
 use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit};
 
-use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, radius, unit_or};
+use super::{
+    FORCE, Recorded, TORQUE, deliver, entry, quantity, radius, replaced, unit_or, weight_as,
+};
 use crate::cli::identify::Static;
 use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
@@ -51,6 +53,11 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
              a torque, or as a force or mass (with --radius for a torque), and the reading in V, mV/V, mA, Hz, ustrain \
              or N; or omit -o",
         ));
+    }
+    if units.load == "N m" {
+        recorded
+            .warnings
+            .extend(replaced::warnings(&result, &args.findings)?);
     }
     recorded.add(&args.input, points.len(), None);
     recorded.warn(recording.all_warnings(), recording.lost.is_some());
@@ -261,15 +268,8 @@ fn on_earth(gravity: Option<f64>, text: Option<&str>) -> Result<(), Failure> {
     }
 }
 
-/// SI units per unit of the load, and their name.
-fn load_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
-    let factor = unit.unit.factor();
-    let radius = radius(args.radius.as_deref())?;
-    let gravity = args.gravity.as_deref();
-    let gravity = gravity.map(|text| quantity("--gravity", text, Kind::Acceleration));
-    let gravity = gravity.transpose()?;
-    on_earth(gravity, args.gravity.as_deref())?;
-    let is_mass = unit.unit.dimension() == MASS;
+/// Asks whether a unit of the load contains a mass or a weight.
+fn refuse_unclear_weight(args: &Static, unit: &NamedUnit) -> Result<(), Failure> {
     if unit.unit.has_bare_weight()
         && let Some([force, mass]) = Unit::readings_of_weight(&unit.text)
     {
@@ -282,6 +282,28 @@ fn load_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
             ),
         ));
     }
+    if let Some(force) = weight_as(unit, TORQUE) {
+        return Err(Failure::usage(
+            ErrorCode::UnitUnclear,
+            format_args!(
+                "--load \"{}\" is in \"{}\", a mass times a length; if it is a torque, give --load-unit \"{force}\"",
+                args.load, unit.text
+            ),
+        ));
+    }
+    Ok(())
+}
+
+/// SI units per unit of the load, and their name.
+fn load_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
+    let factor = unit.unit.factor();
+    let radius = radius(args.radius.as_deref())?;
+    let gravity = args.gravity.as_deref();
+    let gravity = gravity.map(|text| quantity("--gravity", text, Kind::Acceleration));
+    let gravity = gravity.transpose()?;
+    on_earth(gravity, args.gravity.as_deref())?;
+    refuse_unclear_weight(args, unit)?;
+    let is_mass = unit.unit.dimension() == MASS;
     if gravity.is_some() && !is_mass {
         return Err(Failure::usage(
             ErrorCode::ConflictingArguments,
