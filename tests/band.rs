@@ -239,3 +239,64 @@ fn a_slow_torque_is_part_of_the_record() {
         assert!((found / rms - 1.0).abs() < 0.01, "{found} {rms}");
     }
 }
+
+/// Rows of `time_s,bridge_V`, in their order.
+fn rows_of(text: &str) -> Vec<&str> {
+    text.lines().skip(1).collect()
+}
+
+fn table(rows: &[&str]) -> String {
+    format!("time_s,bridge_V\n{}\n", rows.join("\n"))
+}
+
+/// Rows written twice or missing, which --resample puts right, and a gap, a standstill and a tail of zeros: their kinks are
+/// no torque.
+#[test]
+fn the_band_is_chosen_from_what_the_gage_sensed() {
+    let folder = Folder::new();
+    let (text, _) = noisy(20_000, 0);
+    let all = rows_of(&text);
+    let band_hz = |text: &str, more: &[&str]| {
+        folder.write("in.csv", text);
+        let report = folder.json(&[&compensate("in.csv")[..], more].concat());
+        report["band_hz"].as_f64().unwrap()
+    };
+    let clean_hz = band_hz(&text, &[]);
+    let is_odd = |i: usize| i % 997 == 400;
+    let twice = all.iter().enumerate().flat_map(|(i, row)| {
+        let copies = if is_odd(i) { 2 } else { 1 };
+        std::iter::repeat_n(*row, copies)
+    });
+    let twice: Vec<&str> = twice.collect();
+    let missing = |is_missing: &dyn Fn(usize) -> bool| {
+        let rows = all.iter().enumerate().filter(|(i, _)| !is_missing(*i));
+        table(&rows.map(|(_, row)| *row).collect::<Vec<_>>())
+    };
+    let held = |from: usize, to: usize, value: Option<&str>| -> String {
+        let at = |(i, row): (usize, &&str)| {
+            let (time, own) = row.split_once(',').unwrap();
+            let stuck = value.unwrap_or_else(|| all[from].split_once(',').unwrap().1);
+            let shown = if (from..to).contains(&i) { stuck } else { own };
+            format!("{time},{shown}")
+        };
+        let rows: Vec<String> = all.iter().enumerate().map(at).collect();
+        table(&rows.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    for (what, text, more) in [
+        ("twice", table(&twice), &["--resample"][..]),
+        ("missing", missing(&is_odd), &["--resample"]),
+        (
+            "gap",
+            missing(&|i| (8000..8400).contains(&i)),
+            &["--fill", "linear"],
+        ),
+        ("standstill", held(6000, 6400, None), &[]),
+        ("tail", held(15_000, 20_000, Some("0")), &[]),
+    ] {
+        let found_hz = band_hz(&text, more);
+        assert!(
+            (found_hz / clean_hz - 1.0).abs() < 0.25,
+            "{what}: {found_hz} instead of {clean_hz}"
+        );
+    }
+}

@@ -47,6 +47,7 @@ pub use axis::{REVERSED, RateFrom, TimeAxis, falls, seconds_assumed, typical_ste
 pub(crate) use block::Block;
 pub(crate) use choice::{Selection, contradicted, unit_of};
 pub use fill::FilledSpan;
+pub(crate) use first_samples::FirstSamples;
 pub(crate) use memory_stream::{check_cells, check_holes, check_size};
 pub(crate) use message_stream::MessageOrigin;
 pub(crate) use messages::times as message_times;

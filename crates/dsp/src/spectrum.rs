@@ -288,33 +288,38 @@ pub fn welch_steep(
     Ok(SteepSum::of(samples, block_length).density(sample_rate_hz, block_length))
 }
 
-/// Density as by [`welch_steep`], in which signal that is in the ends of the record alone counts as well: they are
-/// covered by blocks of a half, a quarter and an eighth of the length, which must be a power of two.
+/// Density of the parts of a record as by [`welch_steep`], in which signal that is in the ends of a part alone counts as
+/// well: they are covered by blocks of a half, a quarter and an eighth of the length, which must be a power of two.
 ///
 /// A shorter block counts at the lines at which it has far more power than that density explains, with its coarser
 /// lines: a steady line keeps its width.
 ///
 /// # Errors
-/// As for [`welch`].
+/// As for [`welch`], for each part.
 ///
 /// ```
 /// use torqcomp_dsp::spectrum::welch_to_the_ends;
 /// // A cosine of amplitude 2 in the last sixteenth has a mean square of 2/16.
 /// let late = |i: usize| if i < 3840 { 0.0 } else { 2.0 * (0.8 * i as f64).cos() };
 /// let x: Vec<f64> = (0..4096).map(late).collect();
-/// let density = welch_to_the_ends(&x, 1000.0, 1024)?;
+/// let density = welch_to_the_ends(&[&x], 1000.0, 1024)?;
 /// let power: f64 = density.values.iter().map(|v| v * density.step_hz).sum();
 /// assert!((0.8..1.2).contains(&(power / 0.125)));
 /// # Ok::<(), torqcomp_dsp::Error>(())
 /// ```
 pub fn welch_to_the_ends(
-    samples: &[f64],
+    parts: &[&[f64]],
     sample_rate_hz: f64,
     block_length: usize,
 ) -> Result<Density, Error> {
-    check(samples, sample_rate_hz, block_length)?;
-    let mut sum = SteepSum::of(samples, block_length);
+    check(
+        parts.first().unwrap_or(&&[][..]),
+        sample_rate_hz,
+        block_length,
+    )?;
+    let mut sum = SteepSum::of_parts(parts, sample_rate_hz, block_length)?;
     let whole = sum.powers.clone();
+    let count: usize = parts.iter().map(|part| part.len()).sum();
     // The outermost whole blocks stand for what is farther from the ends than three eighths of their length, each
     // shorter one for half of the rest.
     let mut length = block_length / 2;
@@ -322,9 +327,11 @@ pub fn welch_to_the_ends(
     while length >= (block_length / 8).max(SHORTEST_AT_ENDS) {
         let shorter = SteepBlock::of_length(length);
         let explained = shorter.seen(&whole);
-        for start in [0, samples.len() - length] {
-            let power = shorter.power(&samples[start..start + length]);
-            sum.add_end(&power, &explained, share / samples.len() as f64);
+        for part in parts {
+            for start in [0, part.len() - length] {
+                let power = shorter.power(&part[start..start + length]);
+                sum.add_end(&power, &explained, share / count as f64);
+            }
         }
         (length, share) = (length / 2, 0.5 * share);
     }
@@ -421,6 +428,22 @@ impl SteepSum {
         }
         powers.iter_mut().for_each(|sum| *sum /= shares as f64);
         Self { powers, blocks }
+    }
+
+    /// Of the parts of a record, each weighted with its length.
+    fn of_parts(parts: &[&[f64]], rate_hz: f64, block_length: usize) -> Result<Self, Error> {
+        let mut all = Self::of(parts[0], block_length);
+        let mut count = parts[0].len() as f64;
+        for part in &parts[1..] {
+            check(part, rate_hz, block_length)?;
+            let more = Self::of(part, block_length);
+            let share = part.len() as f64 / (count + part.len() as f64);
+            let both = all.powers.iter_mut().zip(&more.powers);
+            both.for_each(|(sum, power)| *sum += share * (power - *sum));
+            all.blocks += more.blocks;
+            count += part.len() as f64;
+        }
+        Ok(all)
     }
 
     /// Adds a share of the power of a shorter block at an end beyond that explained by the others, where that is far

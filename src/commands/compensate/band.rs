@@ -1,16 +1,21 @@
 //! Band of a compensation: as given, or chosen from the record and the stand.
 
+use std::ops::Range;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 use torqcomp_dsp::band::{Band, BandSearch, Deciding, DecidingLines, band_of_stand};
 use torqcomp_dsp::compensate::Inverse;
+use torqcomp_dsp::quality::clipping::Clipping;
+use torqcomp_dsp::quality::interpolated::interpolated;
 use torqcomp_dsp::quality::repeats::repeats;
+use torqcomp_dsp::quality::stuck::standstills;
 
 use crate::cli::BandOption;
 use crate::commands::convert;
 use crate::failure::{ErrorCode, Failure};
 use crate::print::{rounded, short};
-use crate::recording::ChannelStream;
+use crate::recording::{ChannelStream, FirstSamples};
 use crate::stand::Calibration;
 use crate::warning::Warning;
 
@@ -18,6 +23,8 @@ use crate::warning::Warning;
 const RATED_BAND_HZ: f64 = 2400.0;
 /// Highest frequency over the rate of new values: holding them reduces a sine there by 6 % (sin(πx)/(πx)).
 const HELD: f64 = 0.2;
+/// The same where straight lines join them: they reduce a sine there by 6 % (its square).
+const JOINED: f64 = 0.14;
 /// Minimum number of samples for choosing a band, if available.
 const FIRST_SAMPLES: usize = 1 << 17;
 
@@ -55,6 +62,8 @@ pub(super) enum BandSource {
     Stand,
     /// The rate at which new values come, where each is held for several samples.
     HeldSamples,
+    /// The rate at which the record was made before it was interpolated by straight lines.
+    InterpolatedSamples,
     /// `--band HZ`.
     Option,
     /// `--band rated`.
@@ -86,7 +95,7 @@ impl Wanted<'_> {
                 if let Err((index, _)) = convert(self.chain, &mut first.values) {
                     first.values.truncate(index);
                 }
-                let search = BandSearch::of_record(&first.values, rate_hz, self.inverse);
+                let search = self.search(&first, rate_hz);
                 let seconds = first.values.len() as f64 / rate_hz;
                 let from = match first.is_all {
                     true => BandSource::Record,
@@ -97,8 +106,8 @@ impl Wanted<'_> {
                     Some(best) => (best.top_hz, from),
                     None => (band_of_stand(rate_hz, self.inverse), BandSource::Stand),
                 };
-                let (top_hz, from) = match of_held(&first.values, rate_hz) {
-                    Some(held_hz) if held_hz < top_hz => (held_hz, BandSource::HeldSamples),
+                let (top_hz, from) = match of_recorded(&first.values, rate_hz) {
+                    Some(limit) if limit.0 < top_hz => limit,
                     _ => (top_hz, from),
                 };
                 is_too_short = search.is_none();
@@ -121,10 +130,51 @@ impl Wanted<'_> {
     }
 }
 
-/// Highest frequency resolved by samples held for several steps; `None` if they are not held.
-fn of_held(samples: &[f64], rate_hz: f64) -> Option<f64> {
+impl Wanted<'_> {
+    /// The spectrum of what the gage sensed: without samples that were filled in, are stuck or clipped, and only those that
+    /// were recorded if straight lines join them.
+    fn search(&self, first: &FirstSamples, rate_hz: f64) -> Option<BandSearch> {
+        let without = not_recorded(first);
+        let samples = &first.values;
+        let Some(found) = interpolated(samples) else {
+            return BandSearch::of_parts(samples, &without, rate_hz, self.inverse);
+        };
+        let kept = samples.iter().skip(found.first).step_by(found.every);
+        let kept: Vec<f64> = kept.copied().collect();
+        let place = |i: usize| i / found.every;
+        let without = without.iter().map(|s| place(s.start)..place(s.end) + 1);
+        let without: Vec<Range<usize>> = without.collect();
+        BandSearch::of_parts(&kept, &without, rate_hz / found.every as f64, self.inverse)
+    }
+}
+
+/// Stretches whose samples are not what the gage sensed: filled in, stuck or clipped. Their kinks have high
+/// frequencies.
+fn not_recorded(first: &FirstSamples) -> Vec<Range<usize>> {
+    let samples = &first.values;
+    let mut all = first.filled.clone();
+    all.extend(standstills(samples).iter().map(|run| run.start..run.end()));
+    if let Some(clipping) = Clipping::of(samples) {
+        let mut from = 0;
+        for part in samples.chunk_by(|a, b| clipping.holds(*a) == clipping.holds(*b)) {
+            if clipping.holds(part[0]) {
+                all.push(from..from + part.len());
+            }
+            from += part.len();
+        }
+    }
+    all.retain(|stretch| stretch.start < samples.len());
+    all
+}
+
+/// Highest frequency resolved by the samples that were recorded, if others between them are held or interpolated.
+fn of_recorded(samples: &[f64], rate_hz: f64) -> Option<(f64, BandSource)> {
+    if let Some(found) = interpolated(samples) {
+        let joined_hz = JOINED * rate_hz / found.every as f64;
+        return Some((joined_hz, BandSource::InterpolatedSamples));
+    }
     let hold = repeats(samples)?.hold?;
-    Some(HELD * rate_hz / hold as f64)
+    Some((HELD * rate_hz / hold as f64, BandSource::HeldSamples))
 }
 
 impl BandReport {
@@ -146,6 +196,10 @@ impl BandReport {
             ),
             BandSource::HeldSamples => {
                 "set to a fifth of the update rate, because each value is held for several samples"
+                    .to_owned()
+            }
+            BandSource::InterpolatedSamples => {
+                "set to a seventh of the original rate, because the record was interpolated by straight lines"
                     .to_owned()
             }
             BandSource::Record => {

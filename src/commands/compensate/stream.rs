@@ -205,7 +205,12 @@ impl<'a> Gathered<'a> {
         }
         // The few blocks of the transforms leave gaps.
         let block = (self.first.len() / 2).next_power_of_two() / 2;
-        welch_to_the_ends(&self.first, rate_hz, block.min(self.power.block_length())).ok()
+        welch_to_the_ends(
+            &[&self.first],
+            rate_hz,
+            block.min(self.power.block_length()),
+        )
+        .ok()
     }
 }
 

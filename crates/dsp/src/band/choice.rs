@@ -20,6 +20,8 @@
 //! In a quiet periodic record, it forms lines far above the noise instead. If all lines above a frequency together have
 //! no more power than that, they are not signal: `N` is then `q²/(6 f_s)`, and `P` no larger.
 
+use std::ops::Range;
+
 use super::{Band, EDGE, Edge, FALLBACK_FRACTION};
 use crate::compensate::Inverse;
 use crate::noise_density::NoiseDensity;
@@ -41,6 +43,10 @@ const FLOOR_RANGE: [f64; 2] = [0.02, 0.98];
 const BLOCKS: [usize; 2] = [64, 1 << 15];
 /// Minimum length of a record, in blocks.
 const RECORD_BLOCKS: usize = 4;
+/// Powers of two by which blocks may be shorter between stretches that are left out, and least length of what remains, in
+/// blocks.
+const SHORTER: usize = 2;
+const FEWEST_BLOCKS: usize = 3;
 /// Largest power of lines, relative to that of rounding, that rounding may explain: an error of a few levels is not
 /// spread evenly.
 const ROUNDING: f64 = 2.0;
@@ -81,13 +87,26 @@ impl BandSearch {
     /// From a record, in static units of torque. `None` if it has too few samples for a spectrum.
     #[must_use]
     pub fn of_record(samples: &[f64], rate_hz: f64, inverse: &Inverse) -> Option<Self> {
+        Self::of_parts(samples, &[], rate_hz, inverse)
+    }
+
+    /// From a record without the stretches that are not of it, as far as what remains between them is long
+    /// enough for a spectrum.
+    #[must_use]
+    pub fn of_parts(
+        samples: &[f64],
+        without: &[Range<usize>],
+        rate_hz: f64,
+        inverse: &Inverse,
+    ) -> Option<Self> {
         let [shortest, longest] = BLOCKS;
         let longest_here = samples.len() / RECORD_BLOCKS;
         if longest_here < shortest {
             return None;
         }
         let block = (longest_here / 2 + 1).next_power_of_two().min(longest);
-        let density = welch_to_the_ends(samples, rate_hz, block).ok()?;
+        let (block, parts) = parts(samples, without, block);
+        let density = welch_to_the_ends(&parts, rate_hz, block).ok()?;
         let mut search = Self::of_density(&density, rate_hz, inverse)?;
         if let Some(found) = quantisation(samples) {
             search.count_rounding(found.step.powi(2) / 12.0);
@@ -193,6 +212,43 @@ impl BandSearch {
         }
         [noise * self.step_hz, lost * self.step_hz]
     }
+}
+
+/// The parts of a record between stretches that are at least one block long, with a block of this length or somewhat
+/// shorter. The shortest stretches remain in the record if without them the parts would be too short.
+fn parts<'a>(
+    samples: &'a [f64],
+    without: &[Range<usize>],
+    block: usize,
+) -> (usize, Vec<&'a [f64]>) {
+    let mut longest: Vec<&Range<usize>> = without.iter().collect();
+    longest.sort_by_key(|stretch| std::cmp::Reverse(stretch.len()));
+    while !longest.is_empty() {
+        let parts = between(samples, &longest);
+        for shorter in (0..=SHORTER).map(|power| block >> power) {
+            let long = parts.iter().copied().filter(|part| part.len() >= shorter);
+            let long: Vec<&[f64]> = long.collect();
+            let count: usize = long.iter().map(|part| part.len()).sum();
+            if count >= FEWEST_BLOCKS * shorter && 2 * count >= samples.len() {
+                return (shorter, long);
+            }
+        }
+        longest.truncate(longest.len() - longest.len().div_ceil(8));
+    }
+    (block, vec![samples])
+}
+
+/// The parts of a record between stretches.
+fn between<'a>(samples: &'a [f64], stretches: &[&Range<usize>]) -> Vec<&'a [f64]> {
+    let mut stretches = stretches.to_vec();
+    stretches.sort_by_key(|stretch| stretch.start);
+    let (mut parts, mut from) = (Vec::new(), 0);
+    for stretch in stretches {
+        parts.extend(samples.get(from..stretch.start));
+        from = from.max(stretch.end);
+    }
+    parts.extend(samples.get(from..));
+    parts
 }
 
 /// The band for a stand alone: up to where `|H⁻¹|` reaches 10, at most 0.7 of the Nyquist

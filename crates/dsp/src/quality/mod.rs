@@ -13,6 +13,7 @@
 //! | a stuck channel | [`stuck`] |
 //! | isolated outliers | [`spikes`](mod@spikes) |
 //! | the last three in a stream | [`streamed`] |
+//! | straight lines between samples | [`interpolated`](mod@interpolated) |
 //! | repeated samples | [`repeats`](mod@repeats) |
 //! | coarse resolution | [`quantisation`](mod@quantisation) |
 //! | mains hum | [`mains`](mod@mains) |
@@ -26,6 +27,7 @@ pub mod clipping;
 pub mod copies;
 pub mod finite;
 pub mod flat_tops;
+pub mod interpolated;
 pub mod mains;
 pub mod pile_up;
 pub mod quantisation;
