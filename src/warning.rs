@@ -153,6 +153,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["rate-contradicts-stamps", "the rate stated in the file differs from that of the time stamps", "find out which is right, and give it with --rate"],
         ["rate-drift", "the sampling rate of the first rows differs from the mean rate", "give --rate"],
         ["rate-joins-gaps", "--rate joins the samples on both sides of gaps or backward steps in the time stamps", "omit --rate if the stamps are right; fill gaps with --fill, or exclude them with --range"],
+        ["rate-keeps-repeats", "--rate was given, and some time stamps repeat the one before: perhaps rows that were written twice", "omit --rate, and drop the repeats with --resample"],
         ["rate-overrides-stamps", "--rate differs from the rate of the stamps; --rate was used", "omit --rate if the stamps are right"],
         ["repeated-stamps", "a time stamp equals the previous one", "remove the sample, or give --rate"],
         ["rounded-time-stamps", "the stamps are rounded to a quarter of a step or more; the rate is that of all of them", "compare the rate with the recorder's setting; give --rate if you know it more precisely, or what the message says if rows are missing or written twice"],

@@ -1067,3 +1067,18 @@ fn a_counter_that_rolls_over_is_named() {
         assert!(!ran.stderr.contains("rate-joins-gaps"), "{}", ran.stderr);
     }
 }
+/// Every 500th row is written twice.
+#[test]
+fn a_rate_beside_repeated_stamps_is_questioned() {
+    let row = |i: usize| format!("{:.4},{:.6}\n", i as f64 * 2e-4, (i as f64 * 0.01).sin());
+    let rows: String = (0..10_000)
+        .map(|i| row(i).repeat(if i % 500 == 17 { 2 } else { 1 }))
+        .collect();
+    let folder = Folder::new();
+    folder.write("in.csv", format!("time_s,T [N m]\n{rows}"));
+    let given = [&COMPENSATE[..], &["--rate", "5000"]].concat();
+    let said = "20 time stamps repeat the one before, first at 0.0034 s";
+    folder
+        .run(&given)
+        .says(0, &["rate-keeps-repeats", said, "--resample"]);
+}

@@ -24,6 +24,9 @@ pub(super) struct JoinedBreaks {
     /// Number of backward steps, and the first of them.
     backwards: usize,
     first_backwards: Option<IrregularStep>,
+    /// Number of stamps that repeat the one before, and the first of them.
+    repeats: usize,
+    first_repeat: Option<IrregularStep>,
 }
 
 impl StampGrid {
@@ -58,6 +61,9 @@ impl JoinedBreaks {
             if length < 0.0 {
                 self.backwards += 1;
                 self.first_backwards.get_or_insert(found);
+            } else if length == 0.0 && slack < 0.5 {
+                self.repeats += 1;
+                self.first_repeat.get_or_insert(found);
             } else if is_gap(length, slack) || length > LONG + slack {
                 self.gaps += 1;
                 self.missing += after - before - grid.step;
@@ -95,18 +101,47 @@ impl JoinedBreaks {
             )
         });
         let said: Vec<String> = gaps.into_iter().chain(backwards).collect();
-        (!said.is_empty()).then(|| {
-            Warning::new(
-                "rate-joins-gaps",
-                format!(
-                    "{source}: the time stamps {}; --rate joins the samples on both sides, and all later times are \
-                     wrong by that amount. If the stamps are right, omit --rate, and fill gaps with --fill linear or \
-                     exclude them with --range",
-                    said.join(" and ")
-                ),
+        if said.is_empty() {
+            return self.repeated(source, grid);
+        }
+        let repeats = self.first_repeat.map(|repeat| {
+            format!(
+                ", and {} the one before, first at {}: --resample drops those",
+                plural_verb(self.repeats, "stamp repeats", "stamps repeat"),
+                time(repeat.after)
             )
-        })
+        });
+        Some(Warning::new(
+            "rate-joins-gaps",
+            format!(
+                "{source}: the time stamps {}; --rate joins the samples on both sides, and all later times are wrong by \
+                 that amount. If the stamps are right, omit --rate, and fill gaps with --fill linear or exclude them \
+                 with --range{}",
+                said.join(" and "),
+                repeats.unwrap_or_default()
+            ),
+        ))
     }
+
+    /// Warning about repeated stamps, if there are no other breaks.
+    fn repeated(&self, source: &str, grid: &StampGrid) -> Option<Warning> {
+        let first = self.first_repeat?;
+        Some(Warning::new(
+            "rate-keeps-repeats",
+            format!(
+                "{source}: {} the one before, first at {}: if those rows were written twice, --rate takes each for a \
+                 further sample, so that all later times are late and every repeat is a kink; omit --rate, and drop \
+                 them with --resample",
+                plural_verb(self.repeats, "time stamp repeats", "time stamps repeat"),
+                grid.time_text(first.after)
+            ),
+        ))
+    }
+}
+
+/// A number with what fits it.
+fn plural_verb(count: usize, one: &str, several: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { several })
 }
 
 impl Channel {
