@@ -785,3 +785,50 @@ fn a_record_of_little_but_another_resonance_is_said() {
     }
 }
 
+/// Hits that calibrate an amplifier which rests at 0.05 V: that is no torque.
+#[test]
+fn hits_give_the_zero_with_the_calibration() {
+    let mut noise = crate::noise::Noise(19);
+    let omega = TAU * 180.0 / 10_000.0;
+    let (fall, cos) = (
+        (-0.02 * omega).exp(),
+        (omega * (1.0_f64 - 4e-4).sqrt()).cos(),
+    );
+    let (a, b) = (2.0 * fall * cos, -fall * fall);
+    let mut shown = [0.0; 2];
+    let row = |i: usize| {
+        let hit = match (i + 5000) % 10_000 {
+            phase @ 0..12 => 20.0 * (0.5 * TAU * phase as f64 / 12.0).sin(),
+            _ => 0.0,
+        };
+        let next = 0.08 * (1.0 - a - b) * hit + a * shown[0] + b * shown[1];
+        shown = [next, shown[0]];
+        let (x, y) = (
+            hit + 1e-3 * noise.normal(),
+            next + 0.05 + 1e-4 * noise.normal(),
+        );
+        format!("{:.4},{x:.5},{y:.6}\n", i as f64 * 1e-4)
+    };
+    let rows: String = (0..60_000).map(row).collect();
+    let folder = Folder::new();
+    folder.write(
+        "hits.csv",
+        format!("time_s,hammer [N m],bridge [V]\n{rows}"),
+    );
+    let args = [
+        "identify",
+        "response",
+        "hits.csv",
+        "--applied",
+        "hammer",
+        "--measured",
+        "bridge",
+    ];
+    let report = folder.json(&[&args[..], &["-o", "new.toml", "--json"]].concat());
+    assert_close(constant(&report, "torque_per_volt"), 12.5, 0.02);
+    assert_close(constant(&report, "zero"), 0.05, 1e-3);
+    let written = folder.read("new.toml");
+    let recorder = written.split("[recorder]").nth(1).expect("a recorder");
+    assert!(recorder.contains("zero = { value = \"0.0"), "{written}");
+}
+

@@ -7,6 +7,7 @@ mod factor;
 mod modes;
 mod replaced;
 mod response;
+mod rest;
 mod runup;
 mod static_load;
 

@@ -4,8 +4,8 @@ use torqcomp_model::Estimate;
 
 use super::constants::{Ratios, from_ratios, from_residue};
 use super::factor::factor_of;
-use super::modes;
-use super::{FORCE, Recorded, TORQUE, deliver, entry, radius, stand_text, unit_or};
+use super::{FORCE, Recorded, TORQUE, deliver, entry, radius, stand_text, unit_or, weight_as};
+use super::{modes, rest};
 use crate::cli::identify::Response;
 use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
@@ -67,7 +67,17 @@ pub fn run(args: &Response) -> Result<Outcome, Failure> {
         }
     };
     entries.extend(recorder(&mut result, &source));
-    entries.extend(calibration(units, stand.as_ref(), &source, &mut result)?);
+    let converts = calibration(units, stand.as_ref(), &source, &mut result)?;
+    if !converts.is_empty() {
+        let is_written = args.findings.result.output.is_some();
+        entries.extend(zero(
+            &loaded,
+            (stand.as_ref(), is_written),
+            &source,
+            &mut result,
+        )?);
+    }
+    entries.extend(converts);
     deliver(result, recorded, &args.findings, &entries)
 }
 
@@ -271,6 +281,43 @@ fn calibration(
         true => Vec::new(),
         false => vec![written],
     })
+}
+
+/// The zero that belongs to a calibration of a signal: without it, the output of an amplifier at no load would become a
+/// torque. Not if the stand file gives one.
+fn zero(
+    loaded: &[AlignedChannels],
+    (stand, is_written): (Option<&(String, String)>, bool),
+    source: &str,
+    result: &mut Identification,
+) -> Result<Option<Entry>, Failure> {
+    let declared = stand.map(|(name, text)| stand::recorder_of(name, text));
+    let declared = declared.transpose()?.flatten();
+    if declared.is_some_and(|recorder| recorder.zero.is_some()) {
+        return Ok(None);
+    }
+    let unit = loaded[0].channels[1].unit.as_ref();
+    let signal = unit.and_then(|unit| TransducerSignal::of(&unit.unit));
+    let Some(estimate) = signal.and_then(|signal| rest::zero(loaded, signal)) else {
+        if is_written {
+            result.warn(
+                "zero-unknown",
+                "the records do not begin at rest, so the output at no load is unknown, and the stand file takes it as \
+                 0: record it without load, and give it as [recorder] zero",
+            );
+        }
+        return Ok(None);
+    };
+    let zero = NamedEstimate {
+        name: "zero".to_owned(),
+        estimate,
+    };
+    let written = entry("recorder", "zero", &zero, source);
+    result.parameters.push(zero);
+    result
+        .method
+        .push("zero from the mean of the measured channel before the first excitation".to_owned());
+    Ok(Some(written))
 }
 
 /// Sets the unit of the static gain: measured channel over applied channel.
