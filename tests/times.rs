@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use serde_json::Value;
 
 use crate::mcap_file::{Cdr, McapFile};
-use crate::util::{COMPENSATE, Folder, Ran};
+use crate::util::{COMPENSATE, Folder, Ran, codes};
 
 /// Nanoseconds since 1970 at which the records begin: 2024-03-12T13:26:40Z.
 const START_NS: u128 = 1_710_250_000_000_000_000;
@@ -1067,6 +1067,36 @@ fn a_counter_that_rolls_over_is_named() {
         assert!(!ran.stderr.contains("rate-joins-gaps"), "{}", ran.stderr);
     }
 }
+
+/// Four seconds at 5 kHz with stamps of four significant digits, in steps of a millisecond from 1 s on.
+#[test]
+fn stamps_of_four_significant_digits_are_rounded_ones() {
+    let stamp = |i: usize| {
+        let s = i as f64 * 2e-4;
+        if s < 1.0 {
+            format!("{s:.4}")
+        } else {
+            format!("{s:.3}")
+        }
+    };
+    let rows: String = (0..20_000)
+        .map(|i| format!("{},{:.6}\n", stamp(i), (i as f64 * 0.01).sin()))
+        .collect();
+    let folder = Folder::new();
+    folder.write("in.csv", format!("time_s,T [N m]\n{rows}"));
+    let compensate = [&COMPENSATE[..], &["--json", "--force"]].concat();
+    let report = folder.json(&compensate);
+    assert_eq!(
+        (&report["samples"], &report["rate_hz"]),
+        (&20_000.into(), &5000.0.into())
+    );
+    assert!(codes(&report).contains(&"rounded-time-stamps"), "{report}");
+    let report = folder.json(&[&compensate[..], &["--rate", "5000"]].concat());
+    assert!(!codes(&report).contains(&"rate-joins-gaps"), "{report}");
+    let resample = [&compensate[..], &["--resample"]].concat();
+    folder.run(&resample).says(1, &["omit it", "5000 Hz"]);
+}
+
 /// Every 500th row is written twice.
 #[test]
 fn a_rate_beside_repeated_stamps_is_questioned() {

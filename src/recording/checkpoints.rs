@@ -69,6 +69,13 @@ pub(super) fn sharpened(
     })
 }
 
+/// A stamp farther on.
+pub(super) struct Checkpoint {
+    pub(super) stamp: f64,
+    /// Those of the rows around it, in order.
+    pub(super) around: Vec<f64>,
+}
+
 /// Stamps of a text at distances that double, and the last one. `from` is the byte after the head, if they are needed.
 /// Empty if the file cannot be seeked, or a row cannot be parsed on its own.
 ///
@@ -78,7 +85,7 @@ pub(super) fn of_text(
     input: &Input,
     from: Option<u64>,
     plan: &ChannelPlan,
-) -> Result<Vec<f64>, Failure> {
+) -> Result<Vec<Checkpoint>, Failure> {
     match (input.plain_file(), from) {
         (Some(path), Some(from)) => {
             of_file(path, from, plan).map_err(|error| input.unreadable(&error))
@@ -87,7 +94,7 @@ pub(super) fn of_text(
     }
 }
 
-fn of_file(path: &Path, from: u64, plan: &ChannelPlan) -> io::Result<Vec<f64>> {
+fn of_file(path: &Path, from: u64, plan: &ChannelPlan) -> io::Result<Vec<Checkpoint>> {
     // Opening a pipe a second time would wait for a second writer.
     let meta = std::fs::metadata(path)?;
     if !meta.is_file() {
@@ -116,7 +123,7 @@ fn stamp_behind(
     at: u64,
     plan: &ChannelPlan,
     last: bool,
-) -> io::Result<Option<f64>> {
+) -> io::Result<Option<Checkpoint>> {
     file.seek(SeekFrom::Start(at))?;
     let mut bytes = Vec::new();
     file.take(PIECE).read_to_end(&mut bytes)?;
@@ -134,7 +141,11 @@ fn stamp_behind(
         true => rows.times.last(),
         false => rows.times.first(),
     };
-    Ok(stamp.copied())
+    let stamp = stamp.copied();
+    Ok(stamp.map(|stamp| Checkpoint {
+        stamp,
+        around: rows.times,
+    }))
 }
 
 #[cfg(test)]

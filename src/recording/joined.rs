@@ -36,8 +36,8 @@ impl StampGrid {
         let origin = self.origin_ns as f64 * 1e-9 / self.seconds_per_unit;
         let SampleStep { step, .. } = step_of(stamps, origin)?;
         let mut parts = stamps.chunk_by(|a, b| !is_gap((b - a) / step, 0.0) && b >= a);
-        let quantum =
-            parts.find_map(|part| rounding(part, step, origin).map(|line| line.quantum_s));
+        let quantum_of = |part: &[f64]| rounding(part, step, origin).map(|line| line.quantum_s);
+        let quantum = quantum_of(stamps).or_else(|| parts.find_map(quantum_of));
         Some(Self {
             step,
             quantum: quantum.unwrap_or(0.0),

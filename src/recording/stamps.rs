@@ -173,6 +173,13 @@ impl StampGrid {
         }
     }
 
+    /// Whether stamps on this grid are rounded coarsely.
+    pub(super) fn are_coarse(&self, stamps: &[f64]) -> bool {
+        let mut grid = self.clone();
+        grid.allow_rounding(stamps);
+        grid.is_rounded_coarsely()
+    }
+
     /// Whether stamps are so coarse that several samples may share one; their times are then those of the grid.
     pub(crate) fn is_coarse(&self) -> bool {
         self.quantum > self.step
@@ -345,7 +352,7 @@ impl StampGrid {
         if found.after == found.before {
             return format!(
                 "the time stamp {after} repeats the one before it: a sample is stored twice, or the clock stood still; \
-                 use --resample to drop the sample, or --rate HZ if the stamps are wrong"
+                 use --resample to drop the sample, or --rate HZ if the stamps are wrong or have fewer decimals from there on"
             );
         }
         let length = (found.after - found.before) / step;

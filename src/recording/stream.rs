@@ -114,6 +114,10 @@ impl ChannelStream {
             behind_first_rows,
         } = file.stream(place, stamp_use(&selection, reading));
         let later = checkpoints::of_text(input, behind_first_rows, &plan)?;
+        if become_coarse(&later, stamps.as_ref(), of_first_rows.rate_hz) {
+            return Self::of_whole_text(input, choice, reading);
+        }
+        let later: Vec<f64> = later.iter().map(|at| at.stamp).collect();
         let given_hz = reading.rate_hz.filter(|_| !reading.resample);
         let time = match (stamps, given_hz) {
             (stamps, Some(rate_hz)) => TimeAxis::given(rate_hz, stamps.and_then(beside_given_rate)),
@@ -142,6 +146,18 @@ impl ChannelStream {
             text: Some(TextLines::new(plan, layout)),
             source: first_rows.source,
         })
+    }
+
+    /// The selected channel of a text whose stamps become coarse behind its first rows, so that only all of them together
+    /// give the places of the samples.
+    fn of_whole_text(
+        input: &Input,
+        choice: &ChannelChoice,
+        reading: &Reading,
+    ) -> Result<Self, Failure> {
+        let bytes = progress::open(input)?;
+        let recording = TextFile::open(&input.name(), Box::new(bytes), reading)?.read()?;
+        Self::of_recording(recording, choice, reading)
     }
 
     /// Splits the stream into parts that run in parallel: reading blocks of at least `fewest`
@@ -177,6 +193,19 @@ fn stamp_use(selection: &Selection, reading: &Reading) -> StampUse {
     } else {
         StampUse::Unread
     }
+}
+
+/// Whether stamps are rounded more coarsely farther on.
+fn become_coarse(
+    later: &[checkpoints::Checkpoint],
+    stamps: Option<&StampColumn>,
+    rate_hz: Option<f64>,
+) -> bool {
+    let grid = stamps.zip(rate_hz).map(|(stamps, rate_hz)| StampGrid {
+        step: 1.0 / (rate_hz * stamps.seconds_per_unit),
+        ..grid_of(stamps)
+    });
+    grid.is_some_and(|grid| later.iter().any(|at| grid.are_coarse(&at.around)))
 }
 
 /// Format of stamps, with a step to be determined.
