@@ -383,3 +383,36 @@ fn a_speed_that_changes_cannot_be_refined() {
         ran.stderr
     );
 }
+
+/// An induction motor at 29.2 Hz on 60 Hz mains, whose nameplate says 29.5 Hz: the line at twice the mains is near its
+/// fourth order.
+#[test]
+fn a_line_of_the_mains_does_not_decide_the_speed() {
+    let parts = [(6.0, 0.0, 0.0), (0.3, 29.2, 1.0), (1.5, 120.0, 0.4)];
+    let (shown, _) = steady(&parts, 5000.0, 10_000);
+    let mut noise = Noise(17);
+    let shown: Vec<f64> = shown.iter().map(|x| x + 5e-3 * noise.normal()).collect();
+    let folder = Folder::new();
+    folder.write("in.csv", record(&shown, 5000.0));
+    for given in ["29.5", "29.3"] {
+        let args = [
+            &HARMONICS[..],
+            &[given, "--refine", "--orders", "1-4", "--json"],
+        ]
+        .concat();
+        let report = folder.json(&args);
+        let found = report["fundamental_hz"].as_f64().unwrap();
+        assert!((found - 29.2).abs() < 0.01, "{given}: {found}");
+    }
+    let args = [&HARMONICS[..], &["29.5", "--orders", "1-4"]].concat();
+    folder
+        .run(&args)
+        .says(0, &["fundamental-off", "a fundamental of 29.2"]);
+    // In step with the mains, a shaft keeps the orders that coincide with them.
+    let parts = [(6.0, 0.0, 0.0), (0.3, 30.0, 1.0), (1.5, 120.0, 0.4)];
+    let (shown, _) = steady(&parts, 5000.0, 10_000);
+    folder.write("in.csv", record(&shown, 5000.0));
+    let more = ["29.8", "--refine", "--orders", "1-4", "--json"];
+    let report = folder.json(&[&HARMONICS[..], &more].concat());
+    assert!((report["fundamental_hz"].as_f64().unwrap() - 30.0).abs() < 1e-3);
+}

@@ -15,7 +15,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use torqcomp_dsp::Error;
 use torqcomp_dsp::compensate::Inverse;
-use torqcomp_dsp::harmonics::{self, Fundamental, refine_fundamental};
+use torqcomp_dsp::harmonics::{self, Fundamental};
 use torqcomp_dsp::quality::streamed::StreamedFaults;
 use torqcomp_dsp::store::SampleStore;
 use torqcomp_model::{InverseUncertainty, UnitSystem};
@@ -219,7 +219,7 @@ fn refined(
     orders: &[f64],
 ) -> Result<Fundamental, Failure> {
     let (given_hz, span) = (args.fundamental, 0.01 * args.refine_span);
-    let found = refine_fundamental(&record.samples, record.rate_hz, given_hz, span, orders);
+    let found = mains::refine(&record.samples, record.rate_hz, (given_hz, span), orders);
     found.map_err(|error| match error {
         Error::NotRefined { .. } => Failure::failed(
             ErrorCode::NotIdentifiable,

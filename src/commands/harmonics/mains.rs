@@ -1,5 +1,10 @@
 //! Orders indistinguishable from mains lines.
 
+use torqcomp_dsp::Error;
+use torqcomp_dsp::harmonics::{Fundamental, fit, refine_fundamental};
+use torqcomp_dsp::store::SampleStore;
+
+use super::speed::is_sure;
 use super::{ComponentTorque, named};
 use crate::print::short;
 use crate::warning::Warning;
@@ -20,6 +25,47 @@ pub(super) fn grids_with_a_line_at(
         let line_hz = (frequency_hz / grid_hz).round().clamp(1.0, MAINS_LINES) * grid_hz;
         (frequency_hz - line_hz).abs() < 1.0 / duration_s
     })
+}
+
+/// The fundamental within a relative range around a given one. If only orders that mains lines may be show it, it is that
+/// by the other orders: a strong line of the mains near the highest order would decide it alone.
+///
+/// # Errors
+/// As for [`refine_fundamental`].
+pub(super) fn refine(
+    samples: &(impl SampleStore + ?Sized),
+    rate_hz: f64,
+    (start_hz, span): (f64, f64),
+    orders: &[f64],
+) -> Result<Fundamental, Error> {
+    let of_all = refine_fundamental(samples, rate_hz, start_hz, span, orders);
+    let may_be_mains = |order: &f64| {
+        let lines = (1..=MAINS_LINES as u32).map(f64::from);
+        let mut lines = lines.flat_map(|k| GRIDS_HZ.map(|grid_hz| k * grid_hz));
+        lines.any(|line_hz| (line_hz / (order * start_hz) - 1.0).abs() < span + OFF)
+    };
+    let (mains, others): (Vec<f64>, Vec<f64>) = orders.iter().partition(|o| may_be_mains(o));
+    if mains.is_empty() || others.is_empty() {
+        return of_all;
+    }
+    let duration_s = samples.count() as f64 / rate_hz;
+    let is_shown = |found: &Fundamental| {
+        let fitted = fit(samples, rate_hz, 0.0, *found, orders);
+        fitted.is_ok_and(|fitted| {
+            let mut components = fitted.components.iter();
+            components.any(|c| {
+                let mut grids = grids_with_a_line_at(c.frequency_hz, duration_s);
+                is_sure(c) && grids.next().is_none()
+            })
+        })
+    };
+    if of_all.as_ref().is_ok_and(is_shown) {
+        return of_all;
+    }
+    match refine_fundamental(samples, rate_hz, start_hz, span, &others) {
+        Ok(found) if is_shown(&found) => Ok(found),
+        _ => of_all,
+    }
 }
 
 /// Orders at the frequencies of mains lines, indistinguishable in one record. If the fundamental is that of the mains,

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use torqcomp_dsp::harmonics::{Component, Fundamental, Harmonics, fit, refine_fundamental};
 use torqcomp_dsp::store::SampleStore;
 
-use super::mains::grids_with_a_line_at;
+use super::mains::{self, grids_with_a_line_at};
 use crate::cli::REFINE_SPAN;
 use crate::print::rounded;
 use crate::recording::UniformRecord;
@@ -54,7 +54,7 @@ pub(super) fn off(
     let of = |fundamental| fit(&samples[..], rate_hz, 0.0, fundamental, orders).ok();
     let given: Harmonics = of(Fundamental::given(fundamental_hz))?;
     let within = |span: f64| {
-        let found = refine_fundamental(&samples[..], rate_hz, fundamental_hz, span, orders).ok()?;
+        let found = mains::refine(&samples[..], rate_hz, (fundamental_hz, span), orders).ok()?;
         let better = of(Fundamental::given(found.frequency_hz))?;
         let is_there = better.components.iter().any(is_sure)
             && !is_attracted(&given, &better, length as f64 / rate_hz);
