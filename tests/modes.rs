@@ -482,9 +482,10 @@ fn a_decay_tells_modes_but_not_their_residues() {
         "-o",
         "tap.toml",
     ];
-    folder
-        .run(&args)
-        .says(0, &["residues-unknown", "a known torque or force"]);
+    folder.run(&args).says(
+        0,
+        &["residues-unknown", "a known torque or force", "--modes 1"],
+    );
     let table = ["table", "--stand", "tap.toml"];
     folder.run(&table).says(
         1,

@@ -169,7 +169,7 @@ impl<'a> ReadMode<'a> {
 /// Message for a mode with frequency and damping only.
 const NO_RESIDUE: &str = "residue is missing: the fraction of this mode in the static response, as in residue = 0.9; a \
     decay does not give it: determine it by identify response with a known torque or force, or give shape_at_load and \
-    shape_at_gage of all modes";
+    shape_at_gage of all modes. If only one of the modes is the stand's, repeat identify decay with --modes 1";
 
 impl DeclaredMode {
     /// The mode and the index within it of a number, from its index among the numbers of all modes.

@@ -291,4 +291,5 @@ fn modes(result: &mut Identification, source: &str) -> Entry {
 /// Note on several modes of a decay.
 const NO_RESIDUES: &str = "a decay gives frequency and damping of each mode, but not its residue in the response to a \
     torque; residues in the stand file are kept if the number of modes is the same; otherwise add residue to each of \
-    [[modes]], or use identify response with a known torque or force";
+    [[modes]], or use identify response with a known torque or force. If only the strongest mode is the stand's, and the \
+    others belong to a suspension or a hanging weight, say, write it alone: repeat with --modes 1, or with a --band around it";
