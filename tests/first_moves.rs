@@ -785,6 +785,33 @@ fn a_record_of_little_but_another_resonance_is_said() {
     }
 }
 
+/// Amplifiers with an output below zero at no load, or that invert.
+#[test]
+fn negative_zeros_and_gains_are_taken() {
+    let folder = Folder::new();
+    let init = ["init", "--from", "transducer", "--sensitivity", "2 mV/V"];
+    let more = ["--rated-torque", "50 N m", "--natural-frequency", "590 Hz"];
+    let zero = [
+        "--damping-ratio",
+        "0.02",
+        "--zero",
+        "-0.05 mV/V",
+        "-o",
+        "s.toml",
+    ];
+    let run = folder.run(&[&init[..], &more, &zero].concat());
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    assert!(folder.read("s.toml").contains("-0.05 mV/V"));
+    let gain = [
+        &zero[..2],
+        &["--gain", "-200", "--excitation", "5 V", "-o", "t.toml"],
+    ]
+    .concat();
+    let run = folder.run(&[&init[..], &more, &gain].concat());
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    assert!(folder.read("t.toml").contains("gain = \"-200\""));
+}
+
 /// Hits that calibrate an amplifier which rests at 0.05 V: that is no torque.
 #[test]
 fn hits_give_the_zero_with_the_calibration() {

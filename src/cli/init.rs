@@ -47,16 +47,21 @@ pub struct Init {
     #[arg(long, value_name = "NUMBER")]
     pub damping_ratio: Option<String>,
     /// Transducer: change of its output from no load to the rated torque, such as "2 mV/V", "10 V", "8 mA"
-    #[arg(long, value_name = "QUANTITY")]
+    #[arg(long, value_name = "QUANTITY", allow_hyphen_values = true)]
     pub sensitivity: Option<String>,
     /// Transducer: rated torque, such as "50 N m"
     #[arg(long, value_name = "QUANTITY")]
     pub rated_torque: Option<String>,
     /// Bridge: torque per ratio, such as "25 N m/(mV/V)"
-    #[arg(long, value_name = "QUANTITY", conflicts_with = "torque_per_volt")]
+    #[arg(
+        long,
+        value_name = "QUANTITY",
+        allow_hyphen_values = true,
+        conflicts_with = "torque_per_volt"
+    )]
     pub torque_per_ratio: Option<String>,
     /// Bridge: torque per recorded volt, such as "12.5 N m/V"
-    #[arg(long, value_name = "QUANTITY")]
+    #[arg(long, value_name = "QUANTITY", allow_hyphen_values = true)]
     pub torque_per_volt: Option<String>,
     /// Drawing: width of the beam, across the force
     #[arg(long, value_name = "QUANTITY")]
@@ -89,10 +94,10 @@ pub struct Init {
     #[arg(long, value_name = "QUANTITY")]
     pub excitation: Option<String>,
     /// Recorded volts per bridge volt, for a record in volts, such as 200
-    #[arg(long, value_name = "NUMBER")]
+    #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
     pub gain: Option<String>,
     /// Record at no load, such as "12 mA"
-    #[arg(long, value_name = "QUANTITY")]
+    #[arg(long, value_name = "QUANTITY", allow_hyphen_values = true)]
     pub zero: Option<String>,
     /// Standard uncertainty of one of the values above, named by its flag, such as "sensitivity=0.0005 mV/V";
     /// repeatable. For a limit within which all values are equally likely, give the limit divided by 1.73
