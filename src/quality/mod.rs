@@ -14,6 +14,7 @@ use torqcomp_dsp::quality::clipping::Clipping;
 use torqcomp_dsp::quality::mains::MainsLine;
 use torqcomp_dsp::quality::quantisation::{Quantisation, quantisation};
 use torqcomp_dsp::quality::repeats::repeats;
+use torqcomp_dsp::quality::spikes::{Spikes, spikes};
 
 use crate::recording::{AlignedChannels, Channel, TimeAxis};
 use crate::warning::Warning;
@@ -63,6 +64,21 @@ pub(crate) fn clipped(aligned: &AlignedChannels) -> Vec<Warning> {
     };
     let channels = aligned.channels.iter();
     channels.filter_map(of_channel).flatten().collect()
+}
+
+/// Warnings about isolated outliers in channels sampled together.
+pub(crate) fn spiked(aligned: &AlignedChannels) -> Vec<Warning> {
+    let axis = TimeAxis::uniform(aligned.rate_hz, aligned.start);
+    let of_channel = |channel: &Channel| {
+        let found = Spikes::of(&spikes(&channel.samples))?;
+        Some(samples::spiked(
+            &channel.name,
+            unit_of(channel),
+            &found,
+            &axis,
+        ))
+    };
+    aligned.channels.iter().filter_map(of_channel).collect()
 }
 
 /// Warnings about values that are held, of channels sampled together.

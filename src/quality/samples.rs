@@ -236,7 +236,7 @@ fn stuck(name: &str, unit: &str, found: &Standstills, axis: &TimeAxis) -> Warnin
     )
 }
 
-fn spiked(name: &str, unit: &str, found: &Spikes, axis: &TimeAxis) -> Warning {
+pub(super) fn spiked(name: &str, unit: &str, found: &Spikes, axis: &TimeAxis) -> Warning {
     let first = found.first;
     let (places, is_first) = match found.count {
         1 => ("one isolated sample".to_owned(), ""),

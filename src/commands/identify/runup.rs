@@ -22,7 +22,7 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
         ChannelChoice::named(["--torque", "--torque-unit"], &args.torque, torque_unit),
     ];
     let mut read = AlignedChannels::read(&Input::of(&args.input), &choices, &args.reading)?;
-    let clipped = quality::clipped(&read);
+    let faults = [quality::clipped(&read), quality::spiked(&read)].concat();
     let (motion, torque) = (&read.channels[0], &read.channels[1]);
     let motion_unit = unit_or(motion.recorded(), "--motion-unit")?;
     let (kind, turning) = Motion::of(motion_unit.unit.dimension()).ok_or_else(|| {
@@ -68,7 +68,7 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
         motion.len(),
         Some((read.rate_hz, read.rate_std_hz)),
     );
-    recorded.warn(clipped, false);
+    recorded.warn(faults, false);
     recorded.warn(read.warnings, read.is_lossy);
     deliver(result, recorded, &args.findings, &entries)
 }
