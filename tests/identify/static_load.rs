@@ -787,3 +787,18 @@ fn a_calibration_far_from_that_of_the_stand_file_is_said() {
     }
 }
 
+/// Units of torque with a mass, as on data sheets of small motors.
+#[test]
+fn torques_in_masses_are_asked_about() {
+    let reading = |load: f64| 0.05 + 0.08 * load;
+    for (unit, said) in [
+        ("kg cm", "--load-unit \"kgf cm\""),
+        ("kgcm", "kgf cm"),
+        ("counts", "scale those of an encoder to an angle"),
+    ] {
+        let folder = up_and_down(&format!("torque [{unit}],bridge [V]"), reading, None);
+        let run = folder.run(&STATIC);
+        assert_ne!(run.code, 0, "{unit}");
+        assert!(run.stderr.contains(said), "{unit}: {}", run.stderr);
+    }
+}

@@ -202,7 +202,11 @@ fn unit_or(channel: RecordedChannel, flag: &str) -> Result<NamedUnit, Failure> {
             Some(text) => Failure::failed(
                 ErrorCode::UnitUnclear,
                 format_args!(
-                    "the unit \"{text}\" of channel \"{name}\" is unknown; give a known one with {flag}"
+                    "the unit \"{text}\" of channel \"{name}\" is unknown{}; give a known one with {flag}",
+                    match Unit::parse(text) {
+                        Err(why) => format!(" ({why})"),
+                        Ok(_) => String::new(),
+                    }
                 ),
             ),
         }

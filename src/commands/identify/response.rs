@@ -211,12 +211,15 @@ fn to_torque(force: &mut Channel, radius_m: f64) -> Result<(), Failure> {
                 "--radius goes with a force; --applied \"{}\" is in {}{}",
                 force.name,
                 unit.text,
-                match TransducerSignal::of(&unit.unit) {
-                    Some(_) => {
+                match (TransducerSignal::of(&unit.unit), weight_as(&unit, FORCE)) {
+                    (Some(_), _) => {
                         ": give the inverse of the sensitivity of the hammer as --torque-factor, such as \"444.4 N/V\" \
                          for 2.25 mV/N, or leave --radius out for natural frequency and damping alone"
+                            .to_owned()
                     }
-                    None => "",
+                    (None, Some(force)) =>
+                        format!(", a mass; if it is a force, give --applied-unit {force}"),
+                    (None, None) => String::new(),
                 }
             ),
         ));
