@@ -766,6 +766,27 @@ fn counts_are_no_unit_and_no_pounds() {
         ran.says(2, &["one count 1 V"]);
     }
 }
+
+/// A load ten times too large hides the line, but not from the other rows.
+#[test]
+fn a_load_mistyped_by_a_decade_is_named_by_its_row() {
+    let loads = [
+        0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0,
+    ];
+    let mut noise = Noise(3);
+    let row = |(i, load): (usize, &i32)| {
+        let written = if i == 4 { 40 } else { *load };
+        let reading = 0.05 + 0.2 * f64::from(*load) + 1e-4 * noise.normal();
+        format!("{written},{reading:.6}\n")
+    };
+    let rows: String = loads.iter().enumerate().map(row).collect();
+    let folder = Folder::new();
+    folder.write("loads.csv", format!("torque [N m],bridge [V]\n{rows}"));
+    let run = folder.run(&STATIC);
+    assert!(run.stderr.contains("row 5, load 40 N m"), "{}", run.stderr);
+    assert!(!run.stderr.contains("the right ones"), "{}", run.stderr);
+}
+
 /// A slip in the arm, seen from the calibration in the stand file and its rated torque.
 #[test]
 fn a_calibration_far_from_that_of_the_stand_file_is_said() {

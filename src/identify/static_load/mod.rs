@@ -191,7 +191,8 @@ pub fn identify(
         ramp.widen(&mut fit.std, largest);
     }
     zero::limit_std(&mut fit, points, largest);
-    follows(points, &fit, largest)?;
+    let of_rows = (degree, points.len() == rows);
+    follows(points, &fit, largest, (of_rows, units))?;
     let unscale = |(k, v): (usize, &f64)| v / largest.powi(k as i32);
     let curve: Vec<f64> = fit.values.iter().enumerate().map(unscale).collect();
     let mut result = Identification::new("static");
@@ -204,8 +205,7 @@ pub fn identify(
     }
     result.parameters = constants(&fit, largest, units);
     let quality = quality(&curve, points, units);
-    let of_rows = (points.len() == rows, quality.relative);
-    outlier::warn(&mut result, points, (degree, of_rows), units);
+    outlier::warn(&mut result, points, (of_rows, quality.relative), units);
     linear::warn(&mut result, points, &curve, &steps);
     contradicted(&mut result, &fit);
     zero::drifting(&mut result, &fit, points, (largest, &units.reading));
@@ -244,19 +244,25 @@ fn contradicted(result: &mut Identification, fit: &LoadCurve) {
 const FOLLOWS: f64 = 3.0;
 
 /// Rejects readings that do not follow the loads.
-fn follows(points: &[Point], fit: &LoadCurve, largest: f64) -> Result<(), Failure> {
+fn follows(
+    points: &[Point],
+    fit: &LoadCurve,
+    largest: f64,
+    (of_rows, units): ((usize, bool), &LoadUnits),
+) -> Result<(), Failure> {
     let (slope, std) = (fit.values[1].abs(), fit.std[1].unwrap_or(0.0));
     // Rounding of the readings in memory.
     let size = points.iter().fold(0.0_f64, |m, p| m.max(p.reading.abs()));
     if slope > FOLLOWS * std && slope > 1e-12 * size {
         return Ok(());
     }
+    if let Some(off) = outlier::off_line(points, of_rows, units) {
+        return Err(Failure::failed(ErrorCode::NotIdentifiable, off));
+    }
     let empty: Vec<&Point> = zero::without_load(points, largest).collect();
     let zero = empty.iter().map(|p| p.reading).sum::<f64>() / empty.len().max(1) as f64;
-    let unsigned = points
-        .iter()
-        .map(|p| (p.load.abs(), (p.reading - zero).abs()));
-    let why = match correlation(&unsigned.collect::<Vec<_>>()) > ALIKE {
+    let unsigned = |p: &Point| (p.load.abs(), (p.reading - zero).abs());
+    let why = match correlation(&points.iter().map(unsigned).collect::<Vec<_>>()) > ALIKE {
         true => {
             "their magnitudes do agree: give the loads, or the readings, of one direction a minus sign"
         }

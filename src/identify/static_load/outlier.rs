@@ -34,23 +34,23 @@ fn poor(result: &mut Identification, relative: f64) {
 pub(super) fn warn(
     result: &mut Identification,
     points: &[Point],
-    (degree, (is_by_rows, relative)): (usize, (bool, f64)),
+    (of_rows, relative): ((usize, bool), f64),
     units: &LoadUnits,
 ) {
-    if degree != 1 || !off_line(result, points, is_by_rows, units) {
-        poor(result, relative);
+    match off_line(points, of_rows, units) {
+        Some(off) => result.warn("row-off-line", format!("{off}; the constants include it")),
+        None => poor(result, relative),
     }
 }
 
-/// Warns about the point without which all others lie on a line; returns whether there is one.
-fn off_line(
-    result: &mut Identification,
+/// Text about the point without which all others lie on a line, if there is one.
+pub(super) fn off_line(
     points: &[Point],
-    is_by_rows: bool,
+    (degree, is_by_rows): (usize, bool),
     units: &LoadUnits,
-) -> bool {
-    if points.len() < LEAST {
-        return false;
+) -> Option<String> {
+    if points.len() < LEAST || degree != 1 {
+        return None;
     }
     let without = |left_out: usize| {
         let others = points.iter().enumerate().filter(|(i, _)| *i != left_out);
@@ -58,37 +58,31 @@ fn off_line(
     };
     let (_, all) = straight(points);
     let lines = (0..points.len()).map(|i| (i, without(i)));
-    let Some((place, (line, rest))) = lines.min_by(|a, b| a.1.1.total_cmp(&b.1.1)) else {
-        return false;
-    };
+    let (place, (line, rest)) = lines.min_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
     let point = points[place];
     let off = (point.reading - value_of(&line, point.load)).abs();
     let largest = points.iter().fold(0.0_f64, |m, p| m.max(p.load.abs()));
     let is_off =
         rest < WITHOUT * all && off > FAR.0 * rest && off > FAR.1 * (line[1] * largest).abs();
     if !is_off {
-        return false;
+        return None;
     }
     let which = match is_by_rows {
         true => format!("row {}, ", place + 1),
         false => String::new(),
     };
-    result.warn(
-        "row-off-line",
-        format!(
-            "{which}load {} {}, reading {} {}, is {} {} off the line of all others, which lie within {} {} (rms): check \
-             its load and reading; the constants include it",
-            rounded(point.load, 5),
-            units.load,
-            rounded(point.reading, 5),
-            units.reading,
-            rounded(off, 2),
-            units.reading,
-            rounded(rest, 1),
-            units.reading
-        ),
-    );
-    true
+    Some(format!(
+        "{which}load {} {}, reading {} {}, is {} {} off the line of all others, which lie within {} {} (rms): check its \
+         load and reading",
+        rounded(point.load, 5),
+        units.load,
+        rounded(point.reading, 5),
+        units.reading,
+        rounded(off, 2),
+        units.reading,
+        rounded(rest, 1),
+        units.reading
+    ))
 }
 
 /// Zero and slope of the straight line through points, and its residual; not a number where all loads are the same.
