@@ -11,6 +11,7 @@ use super::result::ExcitationLevels;
 use super::score::ScoredModel;
 use super::search::CandidateFit;
 use super::spectra::SpectralLine;
+use super::structure::PlainStand;
 use super::surface::ForceSurface;
 use super::verdict::{Verdict, is_noise};
 use crate::print::{self, relative, rounded};
@@ -256,16 +257,39 @@ pub fn warnings(found: &SearchState, verdict: Verdict) -> Vec<Warning> {
 
 /// Training and held-out records that no single stand fits.
 fn records_apart(before: &ScoredModel) -> Option<Warning> {
-    let [train, holdout] = plain_stands_apart(before)?;
-    Some(Warning::new(
-        "records-apart",
-        format!(
-            "no single plain stand fits both training and hold-out records: fitted separately, the training records \
-             give {:.5} Hz and damping ratio {:.4}, the hold-out records {:.5} Hz and {:.4}. They are of two stands or \
-             settings, or the stand changes with the level",
-            train.natural_hz, train.damping_ratio, holdout.natural_hz, holdout.damping_ratio
+    let stands = plain_stands_apart(before)?;
+    Some(Warning::new("records-apart", apart(&stands)))
+}
+
+/// Largest relative difference of natural frequency and damping ratio of one stand, and least one of two gains.
+const ONE_STAND: [f64; 2] = [1e-3, 0.03];
+const TWO_GAINS: f64 = 0.02;
+
+/// Text about the plain stands of training and of held-out records.
+fn apart([train, holdout]: &[PlainStand; 2]) -> String {
+    let is_near = |a: f64, b: f64, most: f64| (a / b - 1.0).abs() < most;
+    let times = holdout.gain / train.gain;
+    let is_one = is_near(train.natural_hz, holdout.natural_hz, ONE_STAND[0])
+        && is_near(train.damping_ratio, holdout.damping_ratio, ONE_STAND[1]);
+    let cause = match is_one && !is_near(times, 1.0, TWO_GAINS) {
+        true => format!(
+            "Their natural frequencies and damping ratios agree, but the static gain of the hold-out records is {} times \
+             that of the training records: {}",
+            print::rounded(times, 4),
+            match times < 0.0 {
+                true => "a channel of one of them has the other sign",
+                false => "they were recorded with other gains, or are in other units",
+            }
         ),
-    ))
+        false => {
+            "They are of two stands or settings, or the stand changes with the level".to_owned()
+        }
+    };
+    format!(
+        "no single plain stand fits both training and hold-out records: fitted separately, the training records give \
+         {:.5} Hz and damping ratio {:.4}, the hold-out records {:.5} Hz and {:.4}. {cause}",
+        train.natural_hz, train.damping_ratio, holdout.natural_hz, holdout.damping_ratio
+    )
 }
 
 /// Constants too uncertain from the training records for the hold-out error to reveal a missing effect.
@@ -291,4 +315,35 @@ fn uncertain_constants(before: &ScoredModel) -> Option<Warning> {
             ),
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gains_of_records_that_agree_otherwise_are_named() {
+        let stand = |natural_hz, gain| PlainStand {
+            natural_hz,
+            damping_ratio: 0.02,
+            gain,
+        };
+        for (natural_hz, gain, said) in [
+            (
+                179.9994,
+                -0.08,
+                "-1 times that of the training records: a channel of one",
+            ),
+            (
+                180.0,
+                0.16,
+                "2 times that of the training records: they were recorded",
+            ),
+            (180.0, 0.08, "two stands or settings"),
+            (171.0, -0.08, "two stands or settings"),
+        ] {
+            let text = apart(&[stand(180.0, 0.08), stand(natural_hz, gain)]);
+            assert!(text.contains(said), "{text}");
+        }
+    }
 }
