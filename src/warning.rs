@@ -180,6 +180,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["identical-files", "files are identical, byte for byte; in a fit, they count twice, and its uncertainties are too small", "remove the copies"],
         ["mains-lines", "lines at multiples of 50 or 60 Hz stand out", "check grounding and shielding, or declare the effect mains-pickup"],
         ["non-finite", "cells contain no number, or no finite one", "repair them, or cut the record there"],
+        ["interpolated-samples", "the samples lie on straight lines between every k-th of them: the record was interpolated to a higher rate", "use the record as it was recorded, or keep every k-th row"],
         ["repeated-samples", "samples repeat the previous value more often than the resolution explains", "record at the rate of the source"],
         ["spikes", "one or two consecutive samples lie far from their neighbours", "repair them if they mark missing values or are drop-outs or glitches"],
         ["stuck-channel", "the signal is constant for a while, or drops out", "check cables and transmitters, and exclude that part"],

@@ -859,3 +859,34 @@ fn hits_give_the_zero_with_the_calibration() {
     assert!(recorder.contains("zero = { value = \"0.0"), "{written}");
 }
 
+/// A decay of one mode recorded at 1 kHz, and stored at 10 kHz by straight lines: its images are no modes.
+#[test]
+fn a_record_that_was_interpolated_before_has_no_further_modes() {
+    let mut noise = crate::noise::Noise(5);
+    let omega = TAU * 180.0;
+    let ring = |t: f64| (-0.02 * omega * t).exp() * (omega * t).cos();
+    let recorded: Vec<f64> = (0..1001)
+        .map(|i| ring(f64::from(i) * 1e-3) + 1e-4 * noise.normal())
+        .collect();
+    let finer = |i: usize| {
+        let (at, part) = (i / 10, (i % 10) as f64 / 10.0);
+        recorded[at] * (1.0 - part) + recorded[at + 1] * part
+    };
+    let folder = Folder::new();
+    folder.write("in.csv", sampled("T [N m]", 10_000.0, 10_000, finer));
+    let report = folder.json(&["identify", "decay", "in.csv", "--json"]);
+    assert!(codes(&report).contains(&"interpolated-samples"), "{report}");
+    assert_eq!(
+        report["modes"].as_array().map_or(1, Vec::len),
+        1,
+        "{report}"
+    );
+    assert_close(constant(&report, "natural_frequency"), 180.0, 1e-3);
+    folder.write("stand.toml", stand("").replace("60 Hz", "180 Hz"));
+    let report = folder.json(&[&COMPENSATE[..], &["--json"]].concat());
+    assert!(codes(&report).contains(&"interpolated-samples"), "{report}");
+    assert!(
+        report["band_hz"].as_f64().expect("a number") < 140.1,
+        "{report}"
+    );
+}

@@ -19,7 +19,7 @@ use torqcomp_dsp::quality::spikes::{Spikes, spikes};
 use crate::recording::{AlignedChannels, Channel, TimeAxis};
 use crate::warning::Warning;
 
-pub use samples::{Findings, clipped_ends, repeats_of};
+pub use samples::{Findings, clipped_ends, interpolated_by, repeats_of};
 pub use time::TimeFindings;
 
 /// Warnings about samples to be used by a command, and about their time axis.

@@ -2,6 +2,7 @@
 
 use torqcomp_dsp::quality::clipping::{Clipping, Rail};
 use torqcomp_dsp::quality::finite::{NonFinite, non_finite};
+use torqcomp_dsp::quality::interpolated::{Interpolated, interpolated};
 use torqcomp_dsp::quality::mains::{Mains, mains};
 use torqcomp_dsp::quality::quantisation::{Quantisation, quantisation};
 use torqcomp_dsp::quality::repeats::{Repeats, repeats};
@@ -54,6 +55,8 @@ pub struct Findings {
     pub standstills: Option<Standstills>,
     /// Isolated outliers.
     pub spikes: Option<Spikes>,
+    /// Straight lines between samples.
+    pub interpolated: Option<Interpolated>,
     /// Repeated samples.
     pub repeats: Option<Repeats>,
     /// Resolution.
@@ -83,6 +86,7 @@ impl Findings {
             clipping,
             standstills: Standstills::of(&standstills),
             spikes: Spikes::of(&spikes(samples)),
+            interpolated: interpolated(samples),
             repeats: repeats(samples),
             quantisation: quantisation(samples),
             mains: rate_hz.and_then(|rate_hz| mains(samples, rate_hz)),
@@ -138,6 +142,8 @@ impl Findings {
         found.extend(clipping.flat_map(|c| clipped_ends(name, unit, c, axis)));
         found.extend(self.standstills.map(|s| stuck(name, unit, &s, axis)));
         found.extend(self.spikes.map(|s| spiked(name, unit, &s, axis)));
+        let lines = self.interpolated.iter();
+        found.extend(lines.map(|found| interpolated_by(name, found, axis)));
         found.extend(self.repeats.and_then(|r| repeats_of(name, &r, axis)));
         // Lines that may be shaft orders are listed, but cause no warning.
         let hum_of = self.mains.as_ref().filter(|mains| mains.shaft_hz.is_none());
@@ -252,6 +258,41 @@ pub(super) fn spiked(name: &str, unit: &str, found: &Spikes, axis: &TimeAxis) ->
             with_unit(first.before, unit, 6)
         ),
     )
+}
+
+/// Warning about a record that was interpolated to a higher rate.
+pub fn interpolated_by(name: &str, found: &Interpolated, axis: &TimeAxis) -> Warning {
+    let rates = axis.rate_hz.map_or_else(String::new, |rate_hz| {
+        let recorded_hz = rate_hz / found.every as f64;
+        format!(
+            ", from {} to {} Hz: what lies above {} Hz are images of the signal",
+            short(recorded_hz),
+            short(rate_hz),
+            short(0.5 * recorded_hz)
+        )
+    });
+    Warning::new(
+        "interpolated-samples",
+        format!(
+            "\"{name}\": the samples lie on straight lines between every {} of them: the record was interpolated{rates}; \
+             use it as it was recorded, or keep one row in {}, beginning with row {}",
+            ordinal(found.every),
+            found.every,
+            found.first + 1
+        ),
+    )
+}
+
+/// `2nd`, `3rd`, `4th`.
+fn ordinal(number: usize) -> String {
+    let end = match (number % 10, number % 100) {
+        (_, 11..=13) => "th",
+        (1, _) => "st",
+        (2, _) => "nd",
+        (3, _) => "rd",
+        _ => "th",
+    };
+    format!("{number}{end}")
 }
 
 /// Warning about samples that repeat more often than the resolution explains.

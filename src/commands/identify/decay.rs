@@ -5,7 +5,8 @@ use std::sync::Arc;
 use torqcomp_dsp::sort_by_number;
 
 use torqcomp_dsp::quality::clipping::Clipping;
-use torqcomp_dsp::quality::repeats::repeats;
+use torqcomp_dsp::quality::interpolated::{Interpolated, interpolated};
+use torqcomp_dsp::quality::repeats::{Repeats, repeats};
 
 use super::arrivals::{self, EvenTimes};
 use super::constants::{Ratios, from_ratios};
@@ -136,18 +137,15 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
     let rate_std_hz = selection.rate_std_hz;
     let chosen = selection.channel;
     let unit = selection.unit.map_or_else(String::new, |u| u.text);
-    let clipped = Clipping::of(&chosen.samples)
-        .map(|found| quality::clipped_ends(&chosen.name, &unit, &found, &chosen.axis));
-    let clipped = clipped.unwrap_or_default();
     let repeats = repeats(&chosen.samples);
-    let held = repeats.and_then(|found| quality::repeats_of(&chosen.name, &found, &chosen.axis));
+    let lines = interpolated(&chosen.samples);
+    let faults = faults(chosen, &unit, (repeats, lines));
     let jitter = jitter(chosen, &args.reading);
     let jitters = !jitter.is_empty();
     let warnings = [
         recording.all_warnings(),
         selection.warnings,
-        clipped,
-        held.into_iter().collect(),
+        faults,
         quality::coarse_of(std::slice::from_ref(chosen)),
         jitter,
     ];
@@ -158,7 +156,10 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
     drop(recording);
     let record = ringing(channel, clock, rate_hz.is_some());
     let hold = repeats.and_then(|found| found.hold);
-    let (times_s, values, rate_hz) = new_values(record, hold);
+    let (times_s, values, rate_hz) = match lines {
+        Some(found) => one_in(record, found.every, found.first),
+        None => new_values(record, hold),
+    };
     recorded.add(input, values.len(), rate_hz.map(|hz| (hz, rate_std_hz)));
     Ok(Loaded {
         name: input.shown().to_string(),
@@ -168,6 +169,25 @@ fn load(args: &Decay, input: &Path, recorded: &mut Recorded) -> Result<Loaded, F
         values,
         unit,
     })
+}
+
+/// Warnings about clipping, and about samples that were held or interpolated.
+fn faults(
+    channel: &Channel,
+    unit: &str,
+    (repeats, lines): (Option<Repeats>, Option<Interpolated>),
+) -> Vec<Warning> {
+    let (name, axis) = (&channel.name, &channel.axis);
+    let clipped = Clipping::of(&channel.samples);
+    let clipped = clipped.map(|found| quality::clipped_ends(name, unit, &found, axis));
+    let held = repeats.and_then(|found| quality::repeats_of(name, &found, axis));
+    let lines = lines.map(|found| quality::interpolated_by(name, &found, axis));
+    let others = held.into_iter().chain(lines);
+    clipped
+        .unwrap_or_default()
+        .into_iter()
+        .chain(others)
+        .collect()
 }
 
 /// Times and samples of a decay, and its rate if the times are uniform.
@@ -184,9 +204,15 @@ fn new_values((times_s, values, rate_hz): Uniform, hold: Option<usize>) -> Unifo
         changes[i % hold] += 1;
     }
     let first = (0..hold).max_by_key(|phase| changes[*phase]).unwrap_or(0);
-    let of_new = |all: &[f64]| all.iter().skip(first).step_by(hold).copied().collect();
-    let of_new_hz = of_record_hz / hold as f64;
-    (of_new(&times_s), of_new(&values), Some(of_new_hz))
+    one_in((times_s, values, Some(of_record_hz)), hold, first)
+}
+
+/// Every so many samples from the first of them on: those that were recorded, if the others were interpolated, which makes
+/// images of each mode.
+fn one_in((times_s, values, rate_hz): Uniform, every: usize, first: usize) -> Uniform {
+    let kept = |all: &[f64]| all.iter().skip(first).step_by(every).copied().collect();
+    let rate_hz = rate_hz.map(|rate_hz| rate_hz / every as f64);
+    (kept(&times_s), kept(&values), rate_hz)
 }
 
 /// Times and samples of a channel with a start time and rate, and the rate if the times are uniform; a given rate
