@@ -328,12 +328,32 @@ pub(super) fn shifted(result: &mut Identification, delay_s: f64) {
             ", or declare the low-pass of the measured channel as [recorder] low_pass",
         ),
     };
+    let falls = result
+        .get("natural_frequency")
+        .map(|hz| averaged(hz.value(), delay_s.abs()));
     result.warn(
         "channels-shifted",
         format!(
             "the {which} channel lags the other by about {} ms: a delay was fitted, as with --delay, which explains \
-             more than modes alone; check that one recorder takes both channels, with the same filters{or}",
-            rounded(1e3 * delay_s.abs(), 3)
+             more than modes alone; check that one recorder takes both channels, with the same filters{or}{}",
+            rounded(1e3 * delay_s.abs(), 3),
+            falls.unwrap_or_default()
         ),
     );
+}
+
+/// Note on a channel that is late because it averages, over twice its delay: a sine of frequency `f` is reduced to
+/// `sin(x)/x`, `x = 2π f τ` with the delay `τ`.
+fn averaged(hz: f64, delay_s: f64) -> String {
+    let x = std::f64::consts::TAU * hz * delay_s;
+    // A mean over half a period or more hardly passes the resonance.
+    if x > std::f64::consts::FRAC_PI_2 {
+        return String::new();
+    }
+    format!(
+        ". If it is late because it averages (the gate of a frequency counter), its gain falls too, by {} % at {} Hz: that is \
+         neither corrected nor in the uncertainties",
+        rounded(100.0 * (1.0 - x.sin() / x), 2),
+        rounded(hz, 4)
+    )
 }
