@@ -277,7 +277,9 @@ fn of_noise(noise: &RecordNoise, report: &CompensateReport) -> Vec<Warning> {
         let remedy = if from_hz > 0.0 {
             format!("--band {} excludes it", rounded(from_hz, 4))
         } else {
-            "the whole band is affected: check the channel".to_owned()
+            "the whole band is affected, and only the mean is known: right for a constant load, otherwise check the \
+             channel"
+                .to_owned()
         };
         warnings.push(Warning::new(
             "band-lost-in-noise",
