@@ -65,7 +65,7 @@ mod whitening;
 
 use torqcomp_dsp::sort_by_number;
 use torqcomp_model::effects::{Fixed, RecordScales};
-use torqcomp_model::simulate::Between;
+use torqcomp_model::simulate::{Between, substeps};
 
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::Motion;
@@ -227,7 +227,8 @@ pub fn run(mut case: Case, workers: Workers) -> Result<Diagnosis, Failure> {
     }
     let alignment = refuse::check(&case, &context)?;
     context.late = alignment.as_ref().and_then(alignment::Alignment::late);
-    case.records.prepare_for(&context);
+    case.records
+        .prepare_for(&context, !case.declared_effects.is_empty());
     let mode = context.plain.mode();
     context.rings_at_start = case.records.train.iter().any(|r| r.sees_start(&mode));
     let declared = case.declared.map(|plain| DeclaredStand {
@@ -299,7 +300,7 @@ impl SearchState {
             weighted: None,
             is_outdone: false,
         };
-        let coarse = found.records.substeps();
+        let coarse = substeps(context.highest_hz(), found.records.rate_hz());
         found.weigh();
         found.build(coarse, workers);
         found.end_search(workers.threads);

@@ -26,6 +26,10 @@ const SETTLING: f64 = 3.0;
 /// Largest excluded fraction of a record.
 const MOST_EXCLUDED: f64 = 0.1;
 
+/// How much longer the integration steps of a search are than those of a simulation: the model found is refitted with
+/// shorter ones as far as that changes it.
+const COARSER: f64 = 2.0;
+
 /// Fraction of a training record that is fitted if the rest is held out.
 const FITTED: f64 = 0.7;
 
@@ -142,8 +146,8 @@ impl Records {
         }
     }
 
-    /// Sets the integration steps and the compared samples for the plain stand of a context.
-    pub fn prepare_for(&mut self, context: &FitContext) {
+    /// Sets the integration steps and the compared samples for the stand of a context, with or without effects.
+    pub fn prepare_for(&mut self, context: &FitContext, has_effects: bool) {
         let rate_hz = self.rate_hz();
         let mode = context.plain.mode();
         let decay = mode.damping_ratio * mode.omega_rad_s / rate_hz;
@@ -159,7 +163,8 @@ impl Records {
                 record.range.end = count - last;
             }
         }
-        let steps = substeps(context.highest_hz(), rate_hz);
+        let coarser = if has_effects { 1.0 } else { COARSER };
+        let steps = substeps(context.highest_hz() / coarser, rate_hz);
         if steps != self.substeps() {
             self.set_substeps(steps);
         }

@@ -38,7 +38,7 @@ struct Way {
 }
 
 impl SearchState {
-    /// Adds effects to the plain stand. `coarse` is the number of integration steps for it.
+    /// Adds effects to the plain stand. `coarse` is the number of integration steps of a simulation without effects.
     pub(super) fn build(&mut self, coarse: usize, workers: Workers) {
         let (plain, records) = (self.before.clone(), self.records.clone());
         let base = BaseModel::of(plain.clone(), &records);
