@@ -51,13 +51,25 @@ struct Law {
 
 impl Law {
     fn of(effect: &str) -> Option<Self> {
-        let (is_loss, at, size): (_, fn(f64) -> f64, fn(f64) -> f64) = match effect {
-            "cubic-stiffness" => (false, |a| a * a, |omega| 8.0 / (3.0 * omega)),
-            "coulomb-friction" => (true, |_| 1.0, |omega| PI / (2.0 * omega)),
-            "quadratic-damping" => (true, |a| a * a, |omega| 0.75 * PI / omega.powi(3)),
+        let square = |a: f64| a * a;
+        Some(match effect {
+            "cubic-stiffness" => Self {
+                is_loss: false,
+                at: square,
+                size: |omega| 8.0 / (3.0 * omega),
+            },
+            "coulomb-friction" => Self {
+                is_loss: true,
+                at: |_| 1.0,
+                size: |omega| PI / (2.0 * omega),
+            },
+            "quadratic-damping" => Self {
+                is_loss: true,
+                at: square,
+                size: |omega| 0.75 * PI / omega.powi(3),
+            },
             _ => return None,
-        };
-        Some(Self { is_loss, at, size })
+        })
     }
 }
 
