@@ -726,24 +726,28 @@ fn a_mark_for_no_value_is_said_wherever_it_is() {
     }
 }
 
-/// A torque without order through a stand of 180 Hz, whose file says another natural frequency or damping ratio.
-#[test]
-fn a_record_of_little_but_another_resonance_is_said() {
-    let mut noise = crate::noise::Noise(7);
-    let omega = TAU * 180.0 / 5000.0;
+/// Samples of a stand of 180 Hz with a damping ratio of 0.02, with a static gain of 1.
+fn resonator(rate_hz: f64) -> impl FnMut(f64) -> f64 {
+    let omega = TAU * 180.0 / rate_hz;
     let (fall, cos) = (
         (-0.02 * omega).exp(),
         (omega * (1.0_f64 - 4e-4).sqrt()).cos(),
     );
     let (a, b) = (2.0 * fall * cos, -fall * fall);
     let mut shown = [0.0; 2];
-    let motion: Vec<f64> = (0..50_000)
-        .map(|_| {
-            let next = (1.0 - a - b) * noise.normal() + a * shown[0] + b * shown[1];
-            shown = [next, shown[0]];
-            3.0 + next
-        })
-        .collect();
+    move |torque| {
+        let next = (1.0 - a - b) * torque + a * shown[0] + b * shown[1];
+        shown = [next, shown[0]];
+        next
+    }
+}
+
+/// A torque without order through a stand of 180 Hz, whose file says another natural frequency or damping ratio.
+#[test]
+fn a_record_of_little_but_another_resonance_is_said() {
+    let mut noise = crate::noise::Noise(7);
+    let mut respond = resonator(5000.0);
+    let motion: Vec<f64> = (0..50_000).map(|_| 3.0 + respond(noise.normal())).collect();
     let folder = Folder::new();
     folder.write("in.csv", sampled("T [N m]", 5000.0, 50_000, |i| motion[i]));
     for (hz, ratio, said) in [
@@ -816,23 +820,16 @@ fn negative_zeros_and_gains_are_taken() {
 #[test]
 fn hits_give_the_zero_with_the_calibration() {
     let mut noise = crate::noise::Noise(19);
-    let omega = TAU * 180.0 / 10_000.0;
-    let (fall, cos) = (
-        (-0.02 * omega).exp(),
-        (omega * (1.0_f64 - 4e-4).sqrt()).cos(),
-    );
-    let (a, b) = (2.0 * fall * cos, -fall * fall);
-    let mut shown = [0.0; 2];
+    let mut respond = resonator(10_000.0);
     let row = |i: usize| {
         let hit = match (i + 5000) % 10_000 {
             phase @ 0..12 => 20.0 * (0.5 * TAU * phase as f64 / 12.0).sin(),
             _ => 0.0,
         };
-        let next = 0.08 * (1.0 - a - b) * hit + a * shown[0] + b * shown[1];
-        shown = [next, shown[0]];
+        let shown = respond(0.08 * hit);
         let (x, y) = (
             hit + 1e-3 * noise.normal(),
-            next + 0.05 + 1e-4 * noise.normal(),
+            shown + 0.05 + 1e-4 * noise.normal(),
         );
         format!("{:.4},{x:.5},{y:.6}\n", i as f64 * 1e-4)
     };

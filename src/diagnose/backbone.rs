@@ -83,8 +83,8 @@ impl Backbone {
     /// Backbone of a record; `None` if it has too few half-waves or does not decay, or one of the named effects affects
     /// neither frequency nor decay rate.
     pub fn of(record: &StandRecord, effects: &[&str]) -> Option<Self> {
-        let (waves, sign) = half_waves(record)?;
         let laws: Vec<Law> = effects.iter().map(|e| Law::of(e)).collect::<Option<_>>()?;
+        let (waves, sign) = half_waves(record)?;
         let found = Swing::of(&waves, &laws)?;
         let [omega, amplitude] = [found.omega_rad_s, found.amplitude];
         if !(omega > 0.0 && found.rate_per_s > 0.0) {
@@ -131,38 +131,37 @@ impl Swing {
     fn of(waves: &[HalfWave], laws: &[Law]) -> Option<Self> {
         let first = waves.first()?;
         let of_kind = |is_loss: bool| laws.iter().filter(move |law| law.is_loss == is_loss);
-        let turned = |waves: &[HalfWave], k: usize| -> Vec<f64> {
-            let until = |law: &Law| {
-                let before = first.start_s * (law.at)(first.amplitude);
-                let pairs = waves[..=k].windows(2);
-                let each = pairs.map(|w| (w[1].start_s - w[0].start_s) * (law.at)(w[0].amplitude));
-                before + each.sum::<f64>()
-            };
-            of_kind(false).map(until).collect()
+        let before = of_kind(false).map(|law| first.start_s * (law.at)(first.amplitude));
+        let before: Vec<f64> = before.collect();
+        let columns = |wave: &HalfWave, turned: &[f64]| -> Vec<f64> {
+            let turned = before.iter().zip(turned).map(|(before, sum)| before + sum);
+            [1.0, wave.start_s].into_iter().chain(turned).collect()
         };
-        let phases = waves.iter().enumerate().map(|(k, wave)| {
-            let columns = [vec![1.0, wave.start_s], turned(waves, k)].concat();
-            (k as f64 * PI, columns)
-        });
-        let turns = least_squares(phases)?;
-        let omega = turns[1];
-        let mut sums = vec![0.0; 1 + of_kind(true).count()];
-        let mut rows = vec![(first.amplitude, sums.clone())];
+        let mut turned = vec![0.0; before.len()];
+        let mut lost = vec![0.0; 1 + of_kind(true).count()];
+        let mut phases = vec![(0.0, columns(first, &turned))];
+        let mut levels = vec![(first.amplitude, lost.clone())];
         for pair in waves.windows(2) {
             let step_s = pair[1].start_s - pair[0].start_s;
+            for (sum, law) in turned.iter_mut().zip(of_kind(false)) {
+                *sum += step_s * (law.at)(pair[0].amplitude);
+            }
+            phases.push((phases.len() as f64 * PI, columns(&pair[1], &turned)));
             let mean = |of: fn(f64) -> f64| 0.5 * (of(pair[0].amplitude) + of(pair[1].amplitude));
-            sums[0] -= step_s * mean(|amplitude| amplitude);
-            for (sum, law) in sums[1..].iter_mut().zip(of_kind(true)) {
+            lost[0] -= step_s * mean(|amplitude| amplitude);
+            for (sum, law) in lost[1..].iter_mut().zip(of_kind(true)) {
                 *sum -= step_s * mean(law.at);
             }
-            rows.push((pair[1].amplitude, sums.clone()));
+            levels.push((pair[1].amplitude, lost.clone()));
         }
-        let falls = decay(&rows, LEAST_RATIO * omega)?;
+        let turns = least_squares(phases.into_iter())?;
+        let omega = turns[1];
+        let falls = decay(&levels, LEAST_RATIO * omega)?;
         let (start, rate) = (falls[0], falls[1]);
-        let (mut lost, mut bent) = (falls[2..].iter(), turns[2..].iter());
+        let (mut of_falls, mut of_turns) = (falls[2..].iter(), turns[2..].iter());
         let bends = laws.iter().map(|law| match law.is_loss {
-            true => lost.next().copied(),
-            false => bent.next().copied(),
+            true => of_falls.next().copied(),
+            false => of_turns.next().copied(),
         });
         let bends: Vec<f64> = bends.collect::<Option<_>>()?;
         let at_start = |is_loss: bool| {

@@ -69,7 +69,8 @@ pub fn best_pairs(
     let mut pairs = pairs(&changes, &products, samples);
     let training = base.scored.fitted.with_initial_states(&records.train);
     // A decay tells the magnitudes of two at once, also of a pair that changes too much to be chosen to first order.
-    let of_decays = pairs.iter().filter_map(|pair| {
+    let of_decays = pairs.iter().filter(|_| records.are_free());
+    let of_decays = of_decays.filter_map(|pair| {
         let (structure, values) = pair.start(base, &changes);
         let start = Start::from_backbone(&structure, values, &training)?;
         Some((structure, start))

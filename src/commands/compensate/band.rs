@@ -7,7 +7,7 @@ use serde::Serialize;
 use torqcomp_dsp::band::{Band, BandSearch, Deciding, DecidingLines, band_of_stand};
 use torqcomp_dsp::compensate::Inverse;
 use torqcomp_dsp::quality::clipping::Clipping;
-use torqcomp_dsp::quality::interpolated::interpolated;
+use torqcomp_dsp::quality::interpolated::{Interpolated, interpolated};
 use torqcomp_dsp::quality::repeats::repeats;
 use torqcomp_dsp::quality::stuck::standstills;
 
@@ -95,7 +95,8 @@ impl Wanted<'_> {
                 if let Err((index, _)) = convert(self.chain, &mut first.values) {
                     first.values.truncate(index);
                 }
-                let search = self.search(&first, rate_hz);
+                let joined = interpolated(&first.values);
+                let search = self.search(&first, joined, rate_hz);
                 let seconds = first.values.len() as f64 / rate_hz;
                 let from = match first.is_all {
                     true => BandSource::Record,
@@ -106,7 +107,7 @@ impl Wanted<'_> {
                     Some(best) => (best.top_hz, from),
                     None => (band_of_stand(rate_hz, self.inverse), BandSource::Stand),
                 };
-                let (top_hz, from) = match of_recorded(&first.values, rate_hz) {
+                let (top_hz, from) = match of_recorded(&first.values, joined, rate_hz) {
                     Some(limit) if limit.0 < top_hz => limit,
                     _ => (top_hz, from),
                 };
@@ -133,10 +134,15 @@ impl Wanted<'_> {
 impl Wanted<'_> {
     /// The spectrum of what the gage sensed: without samples that were filled in, are stuck or clipped, and only those that
     /// were recorded if straight lines join them.
-    fn search(&self, first: &FirstSamples, rate_hz: f64) -> Option<BandSearch> {
+    fn search(
+        &self,
+        first: &FirstSamples,
+        joined: Option<Interpolated>,
+        rate_hz: f64,
+    ) -> Option<BandSearch> {
         let without = not_recorded(first);
         let samples = &first.values;
-        let Some(found) = interpolated(samples) else {
+        let Some(found) = joined else {
             return BandSearch::of_parts(samples, &without, rate_hz, self.inverse);
         };
         let kept = samples.iter().skip(found.first).step_by(found.every);
@@ -168,8 +174,12 @@ fn not_recorded(first: &FirstSamples) -> Vec<Range<usize>> {
 }
 
 /// Highest frequency resolved by the samples that were recorded, if others between them are held or interpolated.
-fn of_recorded(samples: &[f64], rate_hz: f64) -> Option<(f64, BandSource)> {
-    if let Some(found) = interpolated(samples) {
+fn of_recorded(
+    samples: &[f64],
+    joined: Option<Interpolated>,
+    rate_hz: f64,
+) -> Option<(f64, BandSource)> {
+    if let Some(found) = joined {
         let joined_hz = JOINED * rate_hz / found.every as f64;
         return Some((joined_hz, BandSource::InterpolatedSamples));
     }

@@ -46,11 +46,14 @@ pub fn interpolated(samples: &[f64]) -> Option<Interpolated> {
     if bends.iter().any(|bend| !bend.is_finite()) {
         return None;
     }
+    let squared: Vec<f64> = bends.iter().map(|bend| bend * bend).collect();
     let most = MOST.min(bends.len() / FEWEST);
     (2..=most).rev().find_map(|every| {
         let mut squares = vec![0.0; every];
-        for (i, bend) in bends.iter().enumerate() {
-            squares[i % every] += bend * bend;
+        for line in squared.chunks(every) {
+            for (sum, square) in squares.iter_mut().zip(line) {
+                *sum += square;
+            }
         }
         let knot = (0..every).max_by(|a, b| squares[*a].total_cmp(&squares[*b]))?;
         let rest = squares.iter().sum::<f64>() - squares[knot];

@@ -85,7 +85,7 @@ pub fn other_resonance(
         return None;
     }
     let is_off = |found: &Resonance| is_off(found, declared);
-    near_declared(samples, rate_hz, (first, first.1), |spectrum, _| {
+    near_declared(samples, rate_hz, first, |spectrum, _| {
         spectrum.instead_of(first, FITS).filter(is_off)
     })
 }
@@ -111,33 +111,29 @@ pub fn other_damping(samples: &[f64], rate_hz: f64, declared: (f64, f64)) -> Opt
     // A record may be too short for the blocks of the declared width.
     let finest = 16.0 * (BLOCKS + 1) as f64 * rate_hz / (2.0 * declared_hz * samples.len() as f64);
     let resolved = finest.max(FINER * ratio);
-    near_declared(
-        samples,
-        rate_hz,
-        (declared, resolved),
-        |spectrum, step_hz| {
-            let found = spectrum.instead_of(declared, FITS)?;
-            let times = found.damping_ratio / ratio;
-            let is_resolved = 2.0 * found.damping_ratio * declared_hz > RESOLVED * step_hz;
-            let is_other = times < 1.0 / OTHER_DAMPING || times > OTHER_DAMPING && is_resolved;
-            let is_there = (found.frequency_hz - declared_hz).abs() < APART * declared_hz;
-            (is_there && is_other).then_some(found)
-        },
-    )
+    let range = (declared_hz, resolved);
+    near_declared(samples, rate_hz, range, |spectrum, step_hz| {
+        let found = spectrum.instead_of(declared, FITS)?;
+        let times = found.damping_ratio / ratio;
+        let is_resolved = 2.0 * found.damping_ratio * declared_hz > RESOLVED * step_hz;
+        let is_other = times < 1.0 / OTHER_DAMPING || times > OTHER_DAMPING && is_resolved;
+        let is_there = (found.frequency_hz - declared_hz).abs() < APART * declared_hz;
+        (is_there && is_other).then_some(found)
+    })
 }
 
-/// What is found in spectra around the declared frequency, the longest blocks first; also gives their frequency step. The
-/// blocks resolve a resonance of this damping ratio.
+/// What is found in spectra around a frequency, the longest blocks first; also gives their frequency step. The blocks
+/// resolve a resonance there of this damping ratio.
 fn near_declared(
     samples: &[f64],
     rate_hz: f64,
-    ((declared_hz, _), ratio): ((f64, f64), f64),
+    (near_hz, ratio): (f64, f64),
     find: impl Fn(&LogSpectrum, f64) -> Option<Resonance>,
 ) -> Option<Resonance> {
-    let [from_hz, to_hz] = around(declared_hz, rate_hz)?;
+    let [from_hz, to_hz] = around(near_hz, rate_hz)?;
     let longest = (2 * samples.len() / (BLOCKS + 1)).checked_ilog2()?;
     // Sharp peaks need long blocks; broad ones have less variance with short blocks.
-    let finest = (16.0 * rate_hz / (2.0 * ratio * declared_hz)).log2().ceil() as u32;
+    let finest = (16.0 * rate_hz / (2.0 * ratio * near_hz)).log2().ceil() as u32;
     let powers = (finest.saturating_sub(RESOLUTIONS - 1)..=finest).rev();
     powers.filter(|power| *power <= longest).find_map(|power| {
         let density = welch(samples, rate_hz, 1 << power).ok()?;
