@@ -19,7 +19,6 @@ mod detection;
 mod exchange;
 mod finish;
 mod fit;
-mod from_best;
 mod guard_models;
 mod held;
 mod intersample;

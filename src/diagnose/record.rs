@@ -10,7 +10,6 @@ use torqcomp_model::simulate::{Excitation, MotionState};
 use torqcomp_model::{Chain, Mode, StandRun};
 
 use super::columns::Columns;
-use super::records::EXCLUDED;
 use super::whitening::Whitening;
 
 /// State of the stand at the first sample of a record, and of its drive.
@@ -121,9 +120,6 @@ pub struct Nuisance {
     lines: usize,
 }
 
-/// Minimum number of samples of a record's beginning, so that modes and nuisance terms cannot fit all
-/// of it.
-const SHORTEST: usize = 200;
 /// Time constants after which the free motion from a record's start has decayed.
 pub const DECAYED: f64 = 12.0;
 /// Time constants up to which the range determines the initial state: beyond, extrapolation to the start would amplify
@@ -193,17 +189,6 @@ impl StandRecord {
             },
             measured: Arc::new(self.measured[samples].to_vec()),
             ..self.clone()
-        }
-    }
-
-    /// The beginning of the range as a separate record, including the samples that its end needs.
-    pub fn beginning(&self, part: f64) -> Self {
-        let count = ((part * self.count() as f64) as usize).max(SHORTEST);
-        let end = self.range.start + count.min(self.count());
-        let whole = (end + EXCLUDED).min(self.measured.len());
-        Self {
-            range: self.range.start..end,
-            ..self.part(0..whole)
         }
     }
 
@@ -313,7 +298,9 @@ impl StandRecord {
             columns.push(self.weighted((0..count).map(cosine).collect()));
         }
         for mode in terms.modes.iter().filter(|m| self.has_free_motion(m)) {
-            nuisance.modes.push((columns.count(), mode.omega_rad_s));
+            if self.sees_start(mode) {
+                nuisance.modes.push((columns.count(), mode.omega_rad_s));
+            }
             for column in self.free_motion(mode) {
                 columns.push(column);
             }

@@ -6,14 +6,11 @@ use torqcomp_dsp::sort_by_number;
 use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 use torqcomp_model::effects::{EFFECTS, Effect};
-use torqcomp_model::fit::FitError;
 
 use super::acceptance::refusal_for;
 use super::blocks::{Comparison, family_p_values};
 use super::fit::{FitEffort, FittedModel, fit};
-use super::from_best::fit_from_best;
 use super::reason::{Reason, Status};
-use super::record::StandRecord;
 use super::records::Records;
 use super::score::{BaseModel, EffectParameter, ScoredModel};
 use super::special_cases::fit_special_cases;
@@ -94,8 +91,6 @@ const SIDES: [f64; 2] = [1.02, 0.98];
 /// Maximum sum of squares of a fit, relative to the best one, that is continued, and minimum relative reduction by that.
 const NEAR: f64 = 1.1;
 const NEARER: f64 = 1e-4;
-/// Initial fractions of the records for the first fits of a stand with several modes.
-const BEGINNINGS: [f64; 3] = [0.03, 0.1, 0.3];
 
 /// Number of forms and starts that advance between the stages of fitting.
 pub struct SearchEffort {
@@ -278,8 +273,7 @@ pub fn reject_all(tried: &mut [CandidateFit], reason: impl Fn(&CandidateFit) -> 
 
 /// The best fit of each form, scored. The forms whose starts have the smallest residuals get a first fit (all of them
 /// if there is no effect yet), those that reduce the training error a second one, and those close to the largest
-/// reduction a full one; beside several modes, stuck ones start again from the best. The amount of work depends on the
-/// records alone, not on the clock.
+/// reduction a full one. The amount of work depends on the records alone, not on the clock.
 pub fn fit_all(
     base: &BaseModel,
     forms: &[EffectForm],
@@ -323,7 +317,6 @@ pub fn fit_all(
     });
     let promising = (fitted.train_sum, least);
     fit_special_cases(forms, &mut fits, promising, records, workers);
-    fit_from_best(base, forms, &mut fits, records, workers);
     fit_near_best(&mut fits, records, workers);
     fits
 }
@@ -440,45 +433,12 @@ fn first_fits(
         let starts = starts[k].iter().filter(|_| chosen.contains(&k));
         let fits = starts.flat_map(|start| {
             let records = start.in_records(&training);
-            first_fits_from(&structure.with(forms[k]), &start.values, &records)
+            fit(structure.with(forms[k]), &start.values, &records, FIRST_FIT)
         });
         let fits = fits.collect();
         (workers.progress)(done.fetch_add(1, Ordering::Relaxed) + 1, forms.len());
         fits
     })
-}
-
-/// Fits with very few iterations. For the first effect with several modes, they start from the beginnings of the
-/// records, where errors of frequencies have not yet accumulated to turns.
-fn first_fits_from(
-    structure: &Structure,
-    start: &[f64],
-    records: &[StandRecord],
-) -> Vec<FittedModel> {
-    let has_turns = structure.context.several.is_some() && structure.effects.len() == 1;
-    let is_stepped = has_turns && !records.iter().any(StandRecord::is_free);
-    let at_once = fit(structure.clone(), start, records, FIRST_FIT);
-    let by_beginnings = is_stepped.then(|| from_beginnings(structure.clone(), start, records));
-    [at_once]
-        .into_iter()
-        .chain(by_beginnings)
-        .flatten()
-        .collect()
-}
-
-/// A fit continued from the beginnings of the records to the whole.
-fn from_beginnings(
-    mut structure: Structure,
-    start: &[f64],
-    records: &[StandRecord],
-) -> Result<FittedModel, FitError> {
-    let mut values = start.to_vec();
-    for part in BEGINNINGS {
-        let beginnings: Vec<StandRecord> = records.iter().map(|r| r.beginning(part)).collect();
-        let found = fit(structure, &values, &beginnings, FIRST_FIT)?;
-        (structure, values) = (found.structure, found.values);
-    }
-    fit(structure, &values, records, FIRST_FIT)
 }
 
 /// Significant lines of the training residual.
