@@ -2,12 +2,13 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use torqcomp_model::{ModalPart, ModalResponse, Mode};
 
 use super::fit::{FittedModel, RecordResidual};
 use super::intersample::noise_on_plateaus;
 use super::record::{DECAYED, StandRecord};
-use super::residual_tests::without_mean;
+use super::residual_tests::{autocorrelation, without_mean};
 use super::spectra::{ONLY_NOISE, spectra};
 use crate::identify::Motion;
 use torqcomp_dsp::dot;
@@ -37,6 +38,12 @@ const PIECE: usize = 256;
 const VARIES: f64 = 0.25;
 /// Shortest period, in samples.
 const SHORTEST: usize = 64;
+/// Number of sections of a period whose differences are compared.
+const SECTIONS: usize = 4;
+/// Probability that such differences of the same noise count as different.
+const BY_CHANCE: f64 = 1e-5;
+/// Power of the undisturbed differences, relative to all, up to which a change is no noise.
+const DISTURBED: f64 = 0.5;
 /// Largest fraction of the out-of-band power that the signal may have.
 const SIGNAL: f64 = 0.2;
 
@@ -182,16 +189,53 @@ fn of_periods(record: &StandRecord, y: &[f64], mode: &Mode) -> Option<MeanSquare
     let small = SAME * dot(u, u) / u.len() as f64;
     let time_constant_s = 1.0 / (mode.damping_ratio * mode.omega_rad_s);
     let settled = (DECAYED * time_constant_s * record.rate_hz()) as usize;
-    let (mut run, mut sum, mut count) = (0, 0.0, 0);
+    let mut run = 0;
+    let mut differences = Vec::new();
     for i in period..u.len() {
         let repeats = (u[i] - u[i - period]).powi(2) < 100.0 * small;
         run = if repeats { run + 1 } else { 0 };
         if run > settled {
-            sum += (y[i] - y[i - period]).powi(2);
-            count += 1;
+            differences.push(y[i] - y[i - period]);
         }
     }
-    (count >= period).then(|| (0.5 * sum / f64::from(count as u32), count))
+    let count = differences.len();
+    (count >= period).then(|| {
+        let sections: Vec<&[f64]> = differences.chunks_exact(period / SECTIONS).collect();
+        let [undisturbed, whole] = [mean_square(&undisturbed(&sections)), mean_square(&sections)];
+        match undisturbed < DISTURBED * whole {
+            true => (0.5 * undisturbed, count),
+            false => (0.5 * mean_square(&[&differences]), count),
+        }
+    })
+}
+
+fn mean_square(sections: &[&[f64]]) -> f64 {
+    let count: usize = sections.iter().map(|section| section.len()).sum();
+    let squares = sections.iter().map(|section| dot(section, section));
+    squares.sum::<f64>() / count as f64
+}
+
+/// The sections whose power is not significantly above that of the quietest one: a change of the stand makes some periods
+/// differ, which is no noise. Neighbouring samples are correlated: `n` of them have `n / Σ ρ²` degrees of freedom
+/// (M. S. Bartlett, *Suppl. J. R. Stat. Soc.* 8 (1946), 27).
+fn undisturbed<'a>(sections: &[&'a [f64]]) -> Vec<&'a [f64]> {
+    let power = |section: &&[f64]| mean_square(&[section]);
+    let quietest = sections.iter().min_by(|a, b| power(a).total_cmp(&power(b)));
+    let Some(quietest) = quietest else {
+        return Vec::new();
+    };
+    let [least, freedom] = [power(quietest), degrees_of_freedom(quietest)];
+    let is_alike = |section: &&&[f64]| {
+        let law = FisherSnedecor::new(degrees_of_freedom(section), freedom);
+        law.is_ok_and(|law| power(section) <= law.inverse_cdf(1.0 - BY_CHANCE) * least)
+    };
+    sections.iter().filter(is_alike).copied().collect()
+}
+
+fn degrees_of_freedom(section: &[f64]) -> f64 {
+    let sums = autocorrelation(section, section.len() / 2);
+    let squares = sums[1..].iter().map(|r| (r / sums[0].max(1e-300)).powi(2));
+    (section.len() as f64 / (1.0 + 2.0 * squares.sum::<f64>())).max(1.0)
 }
 
 /// Period of an input that is periodic over most of its length.
@@ -344,6 +388,17 @@ mod tests {
         let times_s: Vec<f64> = (0..40).map(|k| 1.5 * f64::from(k)).collect();
         let floor = NoiseFloor::of(&[steps(&times_s, 64_000)], &passage()).expect("a floor");
         assert_eq!(floor.from, NoiseFloorSource::Periods);
+        assert!((0.9..1.1).contains(&(floor.rms / NOISE)), "{}", floor.rms);
+    }
+
+    #[test]
+    fn a_change_of_the_stand_is_no_noise() {
+        let times_s: Vec<f64> = (0..50).map(|k| 1.5 * f64::from(k)).collect();
+        let mut record = steps(&times_s, 72_000);
+        let measured = record.record.measured.iter().enumerate();
+        let changed = measured.map(|(i, y)| if i < 55_000 { *y } else { 1.1 * y });
+        record.record.measured = std::sync::Arc::new(changed.collect());
+        let floor = NoiseFloor::of(&[record], &passage()).expect("a floor");
         assert!((0.9..1.1).contains(&(floor.rms / NOISE)), "{}", floor.rms);
     }
 }

@@ -165,7 +165,7 @@ fn in_largest_hundredth(residuals: &[RecordResidual]) -> f64 {
 }
 
 /// Sums of products at lags from 0.
-fn autocorrelation(values: &[f64], lags: usize) -> Vec<f64> {
+pub fn autocorrelation(values: &[f64], lags: usize) -> Vec<f64> {
     let sum = |lag: usize| dot(&values[lag..], &values[..values.len() - lag]);
     (0..=lags.min(values.len() - 1)).map(sum).collect()
 }
