@@ -71,8 +71,10 @@ impl FitEffort {
     }
 }
 
-/// Relative reduction of the sum of squares at which a fit has converged.
+/// Reduction of the sum of squares at which a fit has converged: relative, or in variances of the residual, whichever is
+/// larger. Models are compared by several variances.
 const TOLERANCE: f64 = 1e-6;
+const TOLERANCE_OF_VARIANCE: f64 = 0.05;
 /// Correction of a record's initial state, relative to the RMS residual, that makes a second fit worthwhile.
 const START_MATTERS: f64 = 0.05;
 /// Maximum number of such corrections or refits.
@@ -168,9 +170,10 @@ fn minimize(
     let mut parameters = parameters(structure, start);
     parameters.extend(of_records.parameters(records));
     let problem = Unexplained::of((structure, start), records, &of_records, free);
+    let count: usize = records.iter().map(StandRecord::count).sum();
     let options = Options {
         differences: Differences::Forward,
-        tolerance: TOLERANCE,
+        tolerance: TOLERANCE.max(TOLERANCE_OF_VARIANCE / count as f64),
         most_evaluations: effort.iterations * (parameters.len() + 1),
         ..Options::default()
     };
