@@ -823,3 +823,37 @@ fn torques_in_masses_are_asked_about() {
         assert!(run.stderr.contains(said), "{unit}: {}", run.stderr);
     }
 }
+
+/// Three series of eleven rows, of which each has its sensitivity; readings in mV/V with noise.
+fn three_series(noise: &mut Noise, scatter: f64, at_largest: f64) -> Vec<Point> {
+    let mut points = Vec::new();
+    for series in 0..3 {
+        let sensitivity = 0.04 * (1.0 + scatter * noise.normal());
+        points.extend((0..11_i32).map(|k| {
+            let load = 10.0 * f64::from(5 - (k - 5).abs());
+            let off = if k == 5 { at_largest } else { 0.0 };
+            point(
+                load,
+                0.01 + sensitivity * load + off + 1e-4 * noise.normal(),
+                series,
+            )
+        }));
+    }
+    points
+}
+
+#[test]
+fn series_that_differ_in_sensitivity_widen_its_uncertainty() {
+    let units = units();
+    let mut noise = Noise(41);
+    let mut covered = [Coverage::default(), Coverage::default()];
+    for (scatter, coverage) in [0.0, 1e-3].into_iter().zip(&mut covered) {
+        for _ in 0..60 {
+            let found = identify(&three_series(&mut noise, scatter, 0.0), 1, &units).unwrap();
+            coverage.count(of(&found, "sensitivity"), 0.04);
+        }
+    }
+    covered[0].at_least(55, "series alike");
+    covered[1].at_least(52, "series apart");
+}
+

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::Point;
+use super::{NONE, Point};
 use crate::failure::{ErrorCode, Failure};
 
 /// Maximum number of series or mountings open at any row.
@@ -34,6 +34,21 @@ impl Groups {
             groups.ranges.clear();
         }
         groups
+    }
+
+    /// Groups that may differ in sensitivity: mountings, or series at a single one. Rows without load belong to the series
+    /// before them, or to the first one, as they do not show it.
+    pub fn of_sensitivity(points: &[Point], largest: f64) -> Self {
+        let mountings = Self::of(points.iter().map(|p| p.position));
+        if mountings.count() > 0 {
+            return mountings;
+        }
+        let is_loaded = |p: &&Point| p.load.abs() > NONE * largest;
+        let first = points.iter().find(is_loaded).map_or(0, |p| p.series);
+        Self::of(points.iter().scan(first, |series, p| {
+            *series = if is_loaded(&p) { p.series } else { *series };
+            Some(*series)
+        }))
     }
 
     /// Number of groups; 0 for a single one.

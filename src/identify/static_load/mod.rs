@@ -356,7 +356,7 @@ fn method(result: &mut Identification, fit: &LoadCurve, points: &[Point], unit: 
         (spreads.zero, "a spread of the zero over the series of", ""),
         (
             spreads.sensitivity,
-            "a spread over the mountings of",
+            "a spread over the mountings, or the series at a single one, of",
             " at the largest load",
         ),
     ];

@@ -17,6 +17,7 @@ pub(super) struct Mixed {
     /// Normalised load.
     pub loads: Vec<f64>,
     pub series: Groups,
+    /// Groups with a common deviation of the sensitivity.
     pub mountings: Groups,
     /// Variance of each reading, known or 1.
     pub variances: Vec<f64>,
@@ -55,7 +56,7 @@ impl Mixed {
             readings: points.iter().map(|p| p.reading).collect(),
             fixed,
             series: Groups::of(points.iter().map(|p| p.series)),
-            mountings: Groups::of(points.iter().map(|p| p.position)),
+            mountings: Groups::of_sensitivity(points, largest),
             variances: points.iter().map(variance).collect(),
             loads,
             is_known,
