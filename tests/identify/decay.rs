@@ -352,3 +352,33 @@ fn a_frequency_that_changes_is_no_second_mode() {
         assert!(near == 1 || is_said, "{cube}: {hz:?}");
     }
 }
+
+/// Five taps whose frequency and damping scatter by many times what noise explains.
+#[test]
+fn decays_that_differ_widen_the_uncertainty() {
+    let mut noise = Noise(43);
+    let t = times(500, 1000.0);
+    let mut covered = [0; 2].map(|_| Coverage::default());
+    for _ in 0..6 {
+        let taps: Vec<Vec<f64>> = (0..5)
+            .map(|_| {
+                let omega = TAU * 81.4 * (1.0 + 2e-4 * noise.normal());
+                let rate = 0.0135 * (1.0 + 0.05 * noise.normal()) * omega;
+                let swing = |t: &f64| (-rate * t).exp() * (omega * t).sin() + 2e-3 * noise.normal();
+                t.iter().map(swing).collect()
+            })
+            .collect();
+        let record = |values| decay::Ringing {
+            name: "tap",
+            times_s: &t,
+            rate_hz: Some(1000.0),
+            values,
+        };
+        let records: Vec<_> = taps.iter().map(|values| record(values)).collect();
+        let (found, _) = decay::identify(&records, &decay::DecayOptions::default()).unwrap();
+        covered[0].count(of(&found, "damped_frequency"), 81.4);
+        covered[1].count(of(&found, "damping_ratio"), 0.0135);
+    }
+    covered[0].at_least(5, "frequency between taps");
+    covered[1].at_least(5, "damping between taps");
+}

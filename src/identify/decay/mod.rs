@@ -13,6 +13,7 @@ mod modes;
 mod one_mode;
 mod present;
 mod restart;
+mod scatter;
 mod search;
 mod stretches;
 mod turns;
@@ -95,6 +96,7 @@ fn evaluated(
     hum::taken_off(&mut result, &lines);
     present::fit_warnings(&mut result, &fit);
     let reported = modes::with_honest_std(&fit, &stretches)?;
+    let reported = scatter::widened(&mut result, reported, &stretches);
     let order = fit.by_strength(stretches.len());
     tell_modes(&mut result, &fit, &reported, &order);
     result.fit = Some(quality(&fit, &stretches));

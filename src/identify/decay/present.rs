@@ -106,7 +106,7 @@ pub(super) fn beginnings(all: &[Beginning], [restarted, driven]: [&str; 2]) -> V
 const NEAR: f64 = 0.25;
 /// Amplitude of a mode in a decay in which another one rings in its place, relative to that where
 /// it rings.
-const ABSENT: f64 = 0.1;
+pub(super) const ABSENT: f64 = 0.1;
 
 /// Warns if decays show different modes in place of one.
 pub(super) fn apart(result: &mut Identification, fit: &ModesFit, stretches: usize) {

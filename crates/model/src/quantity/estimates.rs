@@ -83,6 +83,18 @@ impl Covariance {
         self
     }
 
+    /// With the standard uncertainties of the first numbers multiplied by factors; correlations remain.
+    #[must_use]
+    pub fn with_factors(mut self, factors: &[f64]) -> Self {
+        for (factor, place) in factors.iter().zip(&self.places) {
+            if let Some(place) = place {
+                self.matrix.row_mut(*place).scale_mut(*factor);
+                self.matrix.column_mut(*place).scale_mut(*factor);
+            }
+        }
+        self
+    }
+
     /// Standard uncertainty of one of them.
     #[must_use]
     pub fn std(&self, i: usize) -> Option<f64> {
