@@ -213,3 +213,30 @@ fn a_doubtful_rate_above_a_table_is_an_assumption() {
         assert_eq!(found, rate_hz, "{header}");
     }
 }
+
+/// 1 kHz in blocks of 50 samples, each stamped on arrival: nothing is missing.
+#[test]
+fn stamps_of_blocks_on_arrival_are_named() {
+    let folder = Folder::new();
+    let late = |block: usize| 4e-3 * ((7 * block) % 10) as f64 / 10.0;
+    let apart = |i: usize| {
+        format!(
+            "{:.6}",
+            0.05 * (i / 50) as f64 + late(i / 50) + 1e-5 * (i % 50) as f64
+        )
+    };
+    let shared = |i: usize| format!("{:.2}", 0.05 * (1 + i / 50) as f64);
+    let stamps: [&dyn Fn(usize) -> String; 2] = [&apart, &shared];
+    for stamp in stamps {
+        folder.write("in.csv", record(stamp, 0..2000));
+        let said = ["in blocks of 50", "--rate HZ"];
+        let refused = compensate(&folder, &[]);
+        refused.says(1, &said);
+        assert!(!refused.stderr.contains("--fill"), "{}", refused.stderr);
+        let report = folder.json(&["inspect", "in.csv", "--json"]);
+        assert!(report["warnings"].to_string().contains(said[0]), "{report}");
+        let given = compensate(&folder, &["--rate", "1000"]);
+        given.says(0, &["2000 samples at 1000 Hz"]);
+        assert!(!given.stderr.contains("rate-joins"), "{}", given.stderr);
+    }
+}

@@ -9,8 +9,8 @@ use torqcomp_dsp::quality::steps::{Event, Events, Steps, broken_steps, rounded_s
 use crate::print::plural;
 use crate::print::rounded as number;
 use crate::recording::{
-    COARSE_STAMPS, Channel, REVERSED, TimeAxis, advice_for_uneven, contradicted, falls, rates_of,
-    rolled_over, same_stamps,
+    ArrivalBlocks, COARSE_STAMPS, Channel, FEWEST_UNLIKE, REVERSED, TimeAxis, advice_for_uneven,
+    contradicted, falls, rates_of, rolled_over, same_stamps,
 };
 use crate::warning::Warning;
 
@@ -27,6 +27,8 @@ pub struct TimeFindings {
     pub steps: Option<Steps>,
     /// Quantum of its stamps, if rounding is their only fault.
     pub rounded: Option<Rounded>,
+    /// Blocks of samples that arrived together.
+    pub(crate) blocks: Option<ArrivalBlocks>,
     /// A rate in the file header that contradicts the stamps.
     pub contradiction: Option<Contradiction>,
 }
@@ -61,6 +63,7 @@ impl TimeFindings {
             contradiction,
         }
     }
+            blocks: ArrivalBlocks::of(stamps_s, rounded.map_or(0.0, |line| line.quantum_s)),
 
     /// The warnings; `whose` names the channels of the axis.
     #[must_use]
@@ -85,6 +88,11 @@ impl TimeFindings {
         found.extend(backwards(whose, axis, steps));
         found.extend(repeated(whose, axis, steps));
         if axis.rate_hz.is_none() {
+        if let Some(blocks) = &self.blocks {
+            let said = format!("{whose}: {}", blocks.explain(1.0));
+            found.push(Warning::new("time-jitter", said));
+            return found;
+        }
             // Without a typical step, every step would be a gap.
             return found;
         }

@@ -21,7 +21,7 @@ const GAP: f64 = 1.5;
 /// normal distribution.
 const BEYOND_SCATTER: f64 = 9.0;
 /// Minimum number of different steps that indicate rounding; one or two are gaps.
-const FEWEST_UNLIKE: usize = 3;
+pub(crate) const FEWEST_UNLIKE: usize = 3;
 /// Largest relative deviation of a step that counts as uniform.
 pub(super) const UNIFORM: f64 = 0.01;
 /// Relative deviation up to which steps are averaged if there are gaps.

@@ -3,6 +3,7 @@
 use torqcomp_decimal::digits;
 use torqcomp_dsp::quality::broken_line::BrokenLine;
 
+use super::arrival_blocks::ArrivalBlocks;
 use super::axis::{SampleStep, rounding, step_of};
 use super::stamps::{IrregularStep, StampGrid, first_missing, is_gap};
 use super::{Channel, RateFrom, TimeAxis};
@@ -38,11 +39,21 @@ impl StampGrid {
         let mut parts = stamps.chunk_by(|a, b| !is_gap((b - a) / step, 0.0) && b >= a);
         let quantum_of = |part: &[f64]| rounding(part, step, origin).map(|line| line.quantum_s);
         let quantum = quantum_of(stamps).or_else(|| parts.find_map(quantum_of));
+        let quantum = quantum.unwrap_or(0.0);
         Some(Self {
             step,
-            quantum: quantum.unwrap_or(0.0),
+            quantum,
+            blocks: ArrivalBlocks::of(stamps, quantum),
             ..self
         })
+    }
+}
+
+impl StampGrid {
+    /// Whether samples arrived in blocks at this rate.
+    fn has_blocks_at(&self, rate_hz: f64) -> bool {
+        let rate = rate_hz * self.seconds_per_unit;
+        self.blocks.is_some_and(|blocks| blocks.are_at(rate))
     }
 }
 
@@ -147,13 +158,16 @@ fn plural_verb(count: usize, one: &str, several: &str) -> String {
 impl Channel {
     /// Warning about breaks in its stamps if a rate is given instead.
     pub(super) fn joined_breaks(&self, source: &str, reading: &Reading) -> Option<Warning> {
-        reading.rate_hz.filter(|_| !reading.resample)?;
+        let rate_hz = reading.rate_hz.filter(|_| !reading.resample)?;
         let stamps_s = self.axis.stamps_s.as_ref()?;
         let grid = StampGrid {
             origin_ns: self.axis.origin_ns,
             ..StampGrid::of_seconds()
         };
         let grid = grid.beside_given_rate(stamps_s)?;
+        if grid.has_blocks_at(rate_hz) {
+            return None;
+        }
         let mut breaks = JoinedBreaks::default();
         match BrokenLine::of(stamps_s) {
             Some(broken) => breaks.look_at_coarse(&grid, &broken, stamps_s),
@@ -171,7 +185,8 @@ impl TimeAxis {
             rate_hz: Some(rate_hz),
             rate_from: RateFrom::Given,
             start: Some(super::moment::Moment::default()),
-            beside,
+            // Stamps of arrival say nothing about gaps.
+            beside: beside.filter(|grid| !grid.has_blocks_at(rate_hz)),
             ..Self::default()
         }
     }

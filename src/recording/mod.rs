@@ -5,6 +5,7 @@
 
 mod aligned;
 mod all_samples;
+mod arrival_blocks;
 mod axis;
 mod block;
 mod checkpoints;
@@ -42,6 +43,8 @@ use crate::warning::Warning;
 
 pub(crate) use aligned::AlignedChannels;
 pub use all_samples::AllSamples;
+pub(crate) use arrival_blocks::ArrivalBlocks;
+pub(crate) use axis::FEWEST_UNLIKE;
 pub(crate) use axis::without_rounding;
 pub use axis::{REVERSED, RateFrom, TimeAxis, falls, seconds_assumed, typical_step};
 pub(crate) use block::Block;

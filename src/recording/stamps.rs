@@ -4,6 +4,7 @@ use torqcomp_decimal::digits;
 use torqcomp_dsp::quality::broken_line::BrokenLine;
 
 use super::Channel;
+use super::arrival_blocks::ArrivalBlocks;
 use super::axis::{RateFrom, TimeAxis, UNIFORM, rounding, step_of, without_rounding};
 use super::checkpoints::sharpened;
 use super::moment::Moment;
@@ -41,6 +42,8 @@ pub(crate) struct StampGrid {
     pub(super) quantum: f64,
     /// For stamps too coarse for single steps to show it, the first place of missing samples.
     pub(super) missing: Option<MissingSamples>,
+    /// Blocks of samples that arrived together.
+    pub(super) blocks: Option<ArrivalBlocks>,
 }
 
 /// Samples left out by the stamps at one place.
@@ -145,6 +148,7 @@ impl StampGrid {
             origin_ns: 0,
             quantum: 0.0,
             missing: None,
+            blocks: None,
         }
     }
 
@@ -170,6 +174,7 @@ impl StampGrid {
                 .and_then(|broken| first_missing(broken, stamps));
             let broken = broken.map(|broken| broken.line.quantum_s);
             self.quantum = rounded.or(broken).unwrap_or(0.0);
+            self.blocks = ArrivalBlocks::of(stamps, self.quantum);
         }
     }
 
@@ -197,14 +202,17 @@ impl StampGrid {
         if !self.is_rounded_coarsely() || part <= TOLERABLE {
             return Ok(());
         }
-        let step_s = 1.0 / rate_hz;
+        if let Some(blocks) = &self.blocks {
+            let said = blocks.explain(self.seconds_per_unit);
+            return Err(Failure::failed(ErrorCode::IrregularTime, said));
+        }
         Err(Failure::failed(
             ErrorCode::IrregularTime,
             format_args!(
                 "the time stamps are rounded to {} s and allow {}; that is too uncertain to divide out a resonance: \
                  give the recorder's rate with --rate HZ",
                 digits::text(self.quantum * self.seconds_per_unit, 3),
-                rates_of([step_s * (1.0 - part), step_s * (1.0 + part)])
+                rates_of([1.0 - part, 1.0 + part].map(|part| part / rate_hz))
             ),
         ))
     }
@@ -334,6 +342,9 @@ impl StampGrid {
     /// Text about a break, and what to do.
     pub(super) fn explain(&self, found: &IrregularStep) -> String {
         let Self { unit, step, .. } = self;
+        if let Some(blocks) = &self.blocks {
+            return blocks.explain(self.seconds_per_unit);
+        }
         let time = |stamp| self.time_text(stamp);
         let (before, after) = (time(found.before), time(found.after));
         if let Some(bits) = self.rolled_over(found.before, found.after) {
@@ -507,6 +518,7 @@ mod tests {
             origin_ns: 0,
             quantum: 0.0,
             missing: None,
+            blocks: None,
         }
     }
 
