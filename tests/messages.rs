@@ -7,7 +7,7 @@ use std::io::Cursor;
 use mcap::records::MessageHeader;
 use mcap::{WriteOptions, Writer};
 
-use crate::util::{Folder, column, sampled, table};
+use crate::util::{Folder, codes, column, sampled, table};
 
 /// Time of the first message.
 const BEGIN_NS: u64 = 1_700_000_000_000_000_000;
@@ -273,3 +273,56 @@ fn a_file_that_is_cut_off_is_used_and_the_loss_is_said() {
     let (_, rows) = table(&ran.stdout);
     assert!(rows.len() > SAMPLES / 3 && rows.len() < SAMPLES);
 }
+
+/// A folder with messages of a number at these milliseconds.
+fn logged(at_ms: impl Iterator<Item = usize>, value: impl Fn(usize) -> f64) -> Folder {
+    let folder = Folder::new();
+    let message = |i: usize| (stamp(i), format!("{{\"y\":{:e}}}", value(i)));
+    folder.write("in.mcap", file(&[("/y", at_ms.map(message).collect())]));
+    folder
+}
+
+/// A signal at a time in milliseconds.
+fn slow(i: usize) -> f64 {
+    2.0 + (TAU * 0.04 * i as f64).sin()
+}
+
+#[test]
+fn regular_losses_and_copies_are_named() {
+    let twice = (0..600).flat_map(|i| vec![i; if i % 10 == 0 { 2 } else { 1 }]);
+    let cases: [(Folder, &str); 3] = [
+        (
+            logged((0..600).filter(|i| i % 10 > 0), slow),
+            "at 1000 Hz if one row in 10 is missing",
+        ),
+        (
+            logged((0..600).filter(|i| i % 3 > 0), slow),
+            "at 1000 Hz if one row in 3 is missing",
+        ),
+        (
+            logged(twice, slow),
+            "at 1000 Hz if one row in 10 was written twice",
+        ),
+    ];
+    for (folder, said) in cases {
+        folder
+            .run(&["extract", "in.mcap", "--topic", "/y", "--field", "y"])
+            .says(0, &[said]);
+        let rate = [
+            "extract",
+            "in.mcap",
+            "--topic",
+            "/y",
+            "--field",
+            "y",
+            "--resample",
+            "--rate",
+            "1000",
+        ];
+        folder.run(&rate).says(0, &["1000 Hz", "interpolated"]);
+        let report = folder.json(&["inspect", "in.mcap", "--json"]);
+        assert!(report["warnings"].to_string().contains(said), "{report}");
+        assert!(!codes(&report).contains(&"time-gaps"), "{report}");
+    }
+}
+

@@ -44,7 +44,10 @@ impl TimeFindings {
         let is_uniform = plain.as_ref().is_some_and(|found| {
             found.jitter.is_none_or(|j| j.peak <= UNIFORM) && found.repeated.count == 0
         });
-        let mut rounded = if is_uniform { None } else { rounded(stamps_s) };
+        // As for the rate: regular gaps may be the rounding of a slower rate.
+        let has_gaps = |found: &Steps| found.gaps.count >= FEWEST_UNLIKE;
+        let is_whole = is_uniform && !plain.as_ref().is_some_and(has_gaps);
+        let mut rounded = if is_whole { None } else { rounded(stamps_s) };
         let may_be_broken = !is_uniform && rounded.is_none();
         let broken = may_be_broken.then(|| BrokenLine::of(stamps_s)).flatten();
         let steps = match (&rounded, &broken) {
@@ -60,10 +63,10 @@ impl TimeFindings {
         Self {
             steps,
             rounded,
+            blocks: ArrivalBlocks::of(stamps_s, rounded.map_or(0.0, |line| line.quantum_s)),
             contradiction,
         }
     }
-            blocks: ArrivalBlocks::of(stamps_s, rounded.map_or(0.0, |line| line.quantum_s)),
 
     /// The warnings; `whose` names the channels of the axis.
     #[must_use]
@@ -85,14 +88,14 @@ impl TimeFindings {
                 ),
             ));
         }
-        found.extend(backwards(whose, axis, steps));
-        found.extend(repeated(whose, axis, steps));
-        if axis.rate_hz.is_none() {
         if let Some(blocks) = &self.blocks {
             let said = format!("{whose}: {}", blocks.explain(1.0));
             found.push(Warning::new("time-jitter", said));
             return found;
         }
+        found.extend(backwards(whose, axis, steps));
+        found.extend(repeated(whose, axis, steps));
+        if axis.rate_hz.is_none() {
             // Without a typical step, every step would be a gap.
             return found;
         }

@@ -9,22 +9,22 @@ use crate::failure::{ErrorCode, Failure};
 const MOST_COPIES: f64 = 4.0;
 /// Number of samples with one stamp above which resampling would lose most of them.
 const SHARED: f64 = 1.5;
-/// Largest fraction of rows missing or written twice that explains rounded stamps as well as another rate.
-const ODD_ROWS: f64 = 0.1;
+/// Largest fraction of rows missing or written twice that explains rounded stamps as well as another rate: one in three.
+const ODD_ROWS: f64 = 0.334;
 
 /// Other possible reasons for rounded stamps that are in `rows` rows on average: every row written several times if that
 /// is a whole number; a few rows missing or written twice if it is nearly one.
 pub(crate) fn same_stamps(rows: f64, quantum_s: f64) -> String {
     let odd = (rows - 1.0).abs();
     if (1e-6..ODD_ROWS).contains(&odd) {
+        let rate = digits::text(1.0 / quantum_s, 6);
         let (which, remedy) = match rows < 1.0 {
-            true => ("is missing", "--fill linear"),
-            false => ("was written twice", "--resample"),
+            true => ("is missing", format!("--resample --rate {rate}")),
+            false => ("was written twice", "--resample".to_owned()),
         };
         return format!(
-            "; the same stamps result at {} Hz if one row in {} {which}: compare the recorder's rate, and give {remedy} if \
-             it is that one",
-            digits::text(1.0 / quantum_s, 6),
+            "; the same stamps result at {rate} Hz if one row in {} {which}: compare the recorder's rate, and give {remedy} \
+             if it is that one",
             digits::text(1.0 / odd, 3),
         );
     }

@@ -21,8 +21,8 @@ pub(crate) const COARSE_STAMPS: f64 = 0.25;
 /// inverse response of a stand with a damping ratio of 0.02 has a relative error of 0.002/0.02 = 10 % at the resonance.
 /// That is the worst case: a rate of few digits is found exactly.
 pub(super) const TOLERABLE: f64 = 2e-3;
-/// Limits of a resampled rate relative to the recorded one.
-const RESAMPLED_RATES: (f64, f64) = (0.9, 1.4);
+/// Limits of a resampled rate relative to the recorded one; the upper one allows for one row in three missing.
+const RESAMPLED_RATES: (f64, f64) = (0.9, 1.51);
 
 /// Format and step of stamps.
 #[derive(Debug, Clone, PartialEq)]
