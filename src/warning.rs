@@ -177,6 +177,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["clipped", "the signal is clipped at its highest or lowest value", "record with a larger range"],
         ["coarse-quantisation", "the signal spans fewer than 256 quantisation steps (100 where it is fitted), or stays within one for most of a window of a run-up", "use a smaller input range; for a run-up, a longer --window"],
         ["constant-channel", "all samples are the same", "check the connection, or choose another channel"],
+        ["two-signals", "every other sample belongs to another signal: two sources are mixed in one record", "record each under a name of its own"],
         ["identical-files", "files are identical, byte for byte; in a fit, they count twice, and its uncertainties are too small", "remove the copies"],
         ["mains-lines", "lines at multiples of 50 or 60 Hz stand out", "check grounding and shielding, or declare the effect mains-pickup"],
         ["non-finite", "cells contain no number, or no finite one", "repair them, or cut the record there"],

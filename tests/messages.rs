@@ -326,3 +326,10 @@ fn regular_losses_and_copies_are_named() {
     }
 }
 
+#[test]
+fn two_nodes_on_one_topic_are_two_signals() {
+    let folder = logged(0..600, |i| slow(i) + if i % 2 == 0 { 0.0 } else { 4.0 });
+    let report = folder.json(&["inspect", "in.mcap", "--json"]);
+    assert!(codes(&report).contains(&"two-signals"), "{report}");
+}
+

@@ -2,6 +2,7 @@
 
 use torqcomp_dsp::quality::clipping::{Clipping, Rail};
 use torqcomp_dsp::quality::finite::{NonFinite, non_finite};
+use torqcomp_dsp::quality::interleaved::interleaved;
 use torqcomp_dsp::quality::interpolated::{Interpolated, interpolated};
 use torqcomp_dsp::quality::mains::{Mains, mains};
 use torqcomp_dsp::quality::quantisation::{Quantisation, quantisation};
@@ -55,6 +56,8 @@ pub struct Findings {
     pub standstills: Option<Standstills>,
     /// Isolated outliers.
     pub spikes: Option<Spikes>,
+    /// Mean difference of two signals that take turns.
+    pub interleaved: Option<f64>,
     /// Straight lines between samples.
     pub interpolated: Option<Interpolated>,
     /// Repeated samples.
@@ -86,6 +89,7 @@ impl Findings {
             clipping,
             standstills: Standstills::of(&standstills),
             spikes: Spikes::of(&spikes(samples)),
+            interleaved: interleaved(samples),
             interpolated: interpolated(samples),
             repeats: repeats(samples),
             quantisation: quantisation(samples),
@@ -142,6 +146,7 @@ impl Findings {
         found.extend(clipping.flat_map(|c| clipped_ends(name, unit, c, axis)));
         found.extend(self.standstills.map(|s| stuck(name, unit, &s, axis)));
         found.extend(self.spikes.map(|s| spiked(name, unit, &s, axis)));
+        found.extend(self.interleaved.map(|by| two_signals(name, unit, by)));
         let lines = self.interpolated.iter();
         found.extend(lines.map(|found| interpolated_by(name, found, axis)));
         found.extend(self.repeats.and_then(|r| repeats_of(name, &r, axis)));
@@ -256,6 +261,17 @@ pub(super) fn spiked(name: &str, unit: &str, found: &Spikes, axis: &TimeAxis) ->
             place(axis, first.index),
             with_unit(first.value, unit, 6),
             with_unit(first.before, unit, 6)
+        ),
+    )
+}
+
+fn two_signals(name: &str, unit: &str, difference: f64) -> Warning {
+    Warning::new(
+        "two-signals",
+        format!(
+            "\"{name}\": every other sample belongs to another signal, {} apart on average: two sources are mixed, as two \
+             nodes that publish on one topic; record each under a name of its own",
+            with_unit(difference.abs(), unit, 3)
         ),
     )
 }

@@ -14,6 +14,7 @@
 //! | isolated outliers | [`spikes`](mod@spikes) |
 //! | the last three in a stream | [`streamed`] |
 //! | straight lines between samples | [`interpolated`](mod@interpolated) |
+//! | two signals in turn | [`interleaved`](mod@interleaved) |
 //! | repeated samples | [`repeats`](mod@repeats) |
 //! | coarse resolution | [`quantisation`](mod@quantisation) |
 //! | mains hum | [`mains`](mod@mains) |
@@ -27,6 +28,7 @@ pub mod clipping;
 pub mod copies;
 pub mod finite;
 pub mod flat_tops;
+pub mod interleaved;
 pub mod interpolated;
 pub mod mains;
 pub mod pile_up;
