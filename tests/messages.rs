@@ -333,3 +333,33 @@ fn two_nodes_on_one_topic_are_two_signals() {
     assert!(codes(&report).contains(&"two-signals"), "{report}");
 }
 
+#[test]
+fn stamps_that_start_again_are_refused() {
+    let folder = Folder::new();
+    let message = |i: usize| {
+        let (sec, nanosec) = (1 + i % 300 / 200, i % 300 % 200 * 5_000_000);
+        let text = format!(
+            "{{\"stamp\":{{\"sec\":{sec},\"nanosec\":{nanosec}}},\"y\":{:e}}}",
+            slow(i)
+        );
+        (stamp(5 * i), text)
+    };
+    folder.write("in.mcap", file(&[("/y", (0..600).map(message).collect())]));
+    let run = |more: &[&str]| {
+        folder.run(
+            &[
+                &["extract", "in.mcap", "--topic", "/y", "--field", "y"],
+                more,
+            ]
+            .concat(),
+        )
+    };
+    run(&[]).says(
+        1,
+        &[
+            "starts again, after 2495000000 ns at 1000000000 ns",
+            "--time log",
+        ],
+    );
+    run(&["--time", "log"]).says(0, &[]);
+}

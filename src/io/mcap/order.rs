@@ -18,6 +18,25 @@ pub struct Sorter {
     pub out_of_order: u64,
     /// Number of samples dropped because they came too late to be sorted.
     pub too_late: u64,
+    run: LateRun,
+    /// Latest time before the times started again, and the first one after that.
+    pub restart: Option<[i64; 2]>,
+}
+
+/// Number of successive late samples, each with earlier ones before and after it, from which the times have started again:
+/// samples that only arrived late fill a gap.
+const RESTART: usize = 50;
+
+/// Successive late samples.
+#[derive(Debug, Default)]
+struct LateRun {
+    /// Latest time before them.
+    latest_ns: i64,
+    first_ns: i64,
+    /// Index after that of the last one.
+    next: usize,
+    /// Number of them beyond earlier samples that follow the preceding one.
+    crossed: usize,
 }
 
 impl Sorter {
@@ -42,6 +61,20 @@ impl Sorter {
         // After all of the same time, to preserve the order of the file.
         let place = self.held.partition_point(|(held, _)| *held <= time_ns);
         self.held.insert(place, (time_ns, value));
+        let latest_ns = self.latest.unwrap_or(time_ns);
+        if self.run.latest_ns != latest_ns || self.run.crossed == 0 && place < self.run.next {
+            self.run = LateRun {
+                latest_ns,
+                first_ns: time_ns,
+                ..LateRun::default()
+            };
+        }
+        let run = &mut self.run;
+        run.crossed += usize::from(place > run.next);
+        run.next = place + 1;
+        if run.crossed == RESTART {
+            self.restart.get_or_insert([latest_ns, run.first_ns]);
+        }
     }
 
     /// Outputs the samples that need not be held back any more, or all at the end.
@@ -79,6 +112,15 @@ mod tests {
         assert_eq!(times, [1, 1, 2, 3, 5]);
         assert_eq!(values, [0.1, 0.11, 0.2, 0.3, 0.5]);
         assert_eq!((sorter.out_of_order, sorter.too_late), (3, 0));
+    }
+
+    #[test]
+    fn times_that_start_again_are_not_a_late_block() {
+        let run = |from: i64, to: i64| (from..to).map(|i| (i, 0.0)).collect::<Vec<_>>();
+        let again = [run(0, 200), run(100, 300)].concat();
+        assert_eq!(sorted(&again).2.restart, Some([199, 100]));
+        let late = [run(0, 100), run(200, 300), run(100, 200)].concat();
+        assert_eq!(sorted(&late).2.restart, None);
     }
 
     #[test]

@@ -216,14 +216,34 @@ impl TopicSignal {
     /// Handles the end of the messages.
     ///
     /// # Errors
-    /// If the messages lack the requested time.
+    /// If the messages lack the requested time, or their times start again.
     pub fn end(&mut self) -> Result<(), Failure> {
         if !self.is_time_chosen {
             self.choose_time()?;
         }
         let sorter = &mut self.sorter;
         self.blocks.finish(|time, value| sorter.push(time, value));
-        Ok(())
+        let restart = self.sorter.restart;
+        restart.map_or(Ok(()), |times_ns| Err(self.starts_again(times_ns)))
+    }
+
+    /// Failure for two runs in one file.
+    fn starts_again(&self, [latest_ns, first_ns]: [i64; 2]) -> Failure {
+        let used = &self.selected.time;
+        let remedy = match used.choice {
+            TimeChoice::Log => "",
+            _ => ", or use --time log if the log times do not",
+        };
+        Failure::failed(
+            ErrorCode::RecordsDiffer,
+            format_args!(
+                "topic {}: {} starts again, after {latest_ns} ns at {first_ns} ns, as where a simulation is reset or two \
+                 files were joined: the samples of both runs would be mixed; split the file there{remedy}",
+                self.selected.topic,
+                used.field.as_deref().unwrap_or("its time"),
+            ),
+        )
+        .at(&self.name)
     }
 
     /// Appends the samples that need not be held back any more, or all.
