@@ -125,8 +125,10 @@ pub struct Blocks {
     spacing: Spacing,
     /// A message whose samples need the time of the next one.
     waiting: Option<(i64, Vec<f64>)>,
-    /// Spacing of the last samples, in ns.
+    /// Mean spacing up to the last message, in ns.
     last_ns: Option<f64>,
+    /// Spacing that two successive messages have shared, in ns.
+    usual_ns: Option<f64>,
     /// Number of messages with an invalid spacing.
     pub without_spacing: u64,
 }
@@ -138,6 +140,7 @@ impl Blocks {
             spacing,
             waiting: None,
             last_ns: None,
+            usual_ns: None,
             without_spacing: 0,
         }
     }
@@ -181,14 +184,34 @@ impl Blocks {
             .and_then(|next| next.checked_sub(time_ns))
             .filter(|gap| *gap > 0 && !values.is_empty())
             .map(|gap| gap as f64 / values.len() as f64);
-        match step.or(self.last_ns) {
-            Some(step) => {
-                self.last_ns = Some(step);
-                spread(time_ns, &values, step, each);
-            }
+        match step
+            .map(|step| self.within(step))
+            .or(self.usual_ns)
+            .or(self.last_ns)
+        {
+            Some(step) => spread(time_ns, &values, step, each),
             None if values.len() == 1 => spread(time_ns, &values, 0.0, each),
             None => self.without_spacing += 1,
         }
+    }
+}
+
+/// Relative difference up to which two spacings are the same.
+const SAME: f64 = 0.05;
+
+impl Blocks {
+    /// Spacing within a message from the mean one up to the next: the usual one, where whole messages are missing in between.
+    fn within(&mut self, mean_ns: f64) -> f64 {
+        let is_same = |a: f64, b: f64| (a / b - 1.0).abs() < SAME;
+        let last_ns = self.last_ns.replace(mean_ns);
+        if last_ns.is_some_and(|last| is_same(mean_ns, last)) {
+            self.usual_ns = Some(mean_ns);
+        }
+        let is_over_gap = |usual: &f64| {
+            let times = (mean_ns / usual).round();
+            times >= 2.0 && is_same(mean_ns, times * usual)
+        };
+        self.usual_ns.filter(is_over_gap).unwrap_or(mean_ns)
     }
 }
 
@@ -252,6 +275,13 @@ mod tests {
         let expected = vec![0, 250, 500, 750, 1000, 1250, 1500, 1750, 2000];
         assert_eq!(times(even(), &messages), (expected, 0));
         assert_eq!(times(even(), &[(5, 3, None)]), (vec![], 1));
+        // The third of five messages is lost.
+        let messages = [(0, 2, None), (20, 2, None), (60, 2, None), (80, 2, None)];
+        let expected = vec![0, 10, 20, 40, 60, 70, 80, 90];
+        assert_eq!(times(even(), &messages), (expected, 0));
+        let messages = [(0, 2, None), (20, 2, None), (40, 2, None), (80, 2, None)];
+        let expected = vec![0, 10, 20, 30, 40, 50, 80, 90];
+        assert_eq!(times(even(), &messages), (expected, 0));
         assert_eq!(times(even(), &[(5, 1, None)]), (vec![5], 0));
     }
 }
