@@ -110,7 +110,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["level-dependent", "the response differs between levels", "look for the cause with diagnose"],
         ["low-pass-fitted", "the measured channel lags as behind an RC low-pass, which was fitted", "check the filter of the amplifier, or record both channels with the same filters"],
         ["mains-taken-off", "steady mains lines were fitted along with the decay and removed", "record for longer if one of them is the stand's own"],
-        ["not-linear", "the readings deviate from the curve by more than their repeatability explains: the characteristic is nonlinear, or the amplifier is at its limit", "omit the loads beyond the limit, or use --degree 3"],
+        ["not-linear", "the mean reading at a load deviates from the curve by more than its repeatability explains: the characteristic is nonlinear, or the amplifier is at its limit", "omit the loads beyond the limit, or use --degree 3"],
         ["no-unloading", "no readings were taken during unloading, so the hysteresis is unknown", "unload in steps as well"],
         ["noise-before-resonance", "the residual follows the resonance: something else also drives the stand, or the input is noisy, which makes the gain too small", "reduce the noise of --applied, or excite more"],
         ["noisy-motion", "much of the measured acceleration or speed is noise; the resulting bias was corrected", "use a longer window or a better sensor"],

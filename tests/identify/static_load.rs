@@ -857,3 +857,13 @@ fn series_that_differ_in_sensitivity_widen_its_uncertainty() {
     covered[1].at_least(52, "series apart");
 }
 
+/// The amplifier is at its limit at the largest load: 0.25 % of the deflection are missing there.
+#[test]
+fn one_load_off_the_line_is_said() {
+    let warned = |off: f64| {
+        let points = three_series(&mut Noise(42), 0.0, off);
+        let found = identify(&points, 1, &units()).unwrap();
+        found.warnings.iter().any(|w| w.code == "not-linear")
+    };
+    assert!(warned(-0.005) && !warned(0.0));
+}

@@ -12,7 +12,7 @@ use crate::identify::{Identification, rms};
 use crate::print::rounded;
 use torqcomp_dsp::sort_by_number;
 
-/// Distance of the means from the curve, relative to what their scatter explains and to the deflection at the largest
+/// Distance of a mean from the curve, relative to what their scatter explains and to the deflection at the largest
 /// load, above which a warning is given.
 const OFF: (f64, f64) = (5.0, 1e-3);
 /// Step of the mean between the two largest loads, relative to that of the curve, below which the reading
@@ -108,17 +108,18 @@ pub(super) fn warn(
         return;
     }
     let scatter = rms(&about) * (about.len() as f64 / freedom as f64).sqrt();
-    let each = (points.len() as f64 / count as f64).sqrt();
-    let off = rms(&means);
     let deflection = (value_of(curve, steps.largest) - curve[0]).abs();
     let readings: Vec<f64> = points.iter().map(|p| p.reading).collect();
     // Rounding of equal readings is no scatter.
     let rounding = resolution(&readings).unwrap_or(0.0) / 12.0_f64.sqrt();
     let of_load = curve[1].abs() * steps.load_std;
-    let expected = (scatter / each).max(rounding).max(of_load);
-    if off <= OFF.0 * expected || off <= OFF.1 * deflection {
+    let expected = |rows: usize| (scatter / (rows as f64).sqrt()).max(rounding).max(of_load);
+    let each = means.iter().zip(&groups);
+    let off = each.map(|(mean, group)| (mean.abs(), expected(group.len())));
+    let beyond = off.filter(|(off, expected)| *off > OFF.0 * expected && *off > OFF.1 * deflection);
+    let Some((off, expected)) = beyond.max_by(|a, b| a.0.total_cmp(&b.0)) else {
         return;
-    }
+    };
     let why = match limit(&means, curve, steps) {
         Some(load) => format!(
             "the reading hardly rises beyond load {}: amplifier or recorder is at its limit; omit the loads beyond it, \
@@ -132,7 +133,7 @@ pub(super) fn warn(
     result.warn(
         "not-linear",
         format!(
-            "the mean readings deviate from the curve by {} % of the deflection, {} what their scatter explains: {why}",
+            "a mean reading deviates from the curve by {} % of the deflection, {} what its scatter explains: {why}",
             rounded(100.0 * off / deflection, 2),
             match expected > 0.0 {
                 true => format!("{} times", rounded(off / expected, 2)),
