@@ -296,3 +296,32 @@ fn a_torque_that_is_held_is_right_if_it_acts_and_late_if_not() {
         );
     }
 }
+
+/// A fan: drag of 2e-4 N m s²/rad² beside the viscous friction, which would absorb it.
+#[test]
+fn drag_is_named() {
+    let torque = torques(4000, |t| match t {
+        t if t < 2.0 => 3.0,
+        _ => -3.0,
+    });
+    let fan = |drag: f64| {
+        let mut speed = 0.0_f64;
+        let step = |torque: &f64| {
+            for _ in 0..10 {
+                let friction = 0.02 * speed + drag * speed * speed.abs() + 0.05 * speed.signum();
+                speed += (torque - friction) / 0.008 * 1e-4;
+            }
+            speed
+        };
+        noisy(&torque.iter().map(step).collect::<Vec<_>>(), 0.1, 5)
+    };
+    let found = |drag| evaluated(&fan(drag), &noisy(&torque, 0.02, 6), None).unwrap();
+    let with = found(2e-4);
+    let warning = with.warnings.iter().find(|w| w.code == "drag");
+    let message = &warning.expect("a warning").message;
+    let viscous = message.split("viscous_friction ").nth(1).unwrap();
+    let viscous: f64 = viscous.split(' ').next().unwrap().parse().unwrap();
+    assert!((viscous / 0.02 - 1.0).abs() < 0.05, "{message}");
+    assert!(!message.contains("check the signs"), "{message}");
+    assert!(!warns(&found(0.0), "drag"));
+}

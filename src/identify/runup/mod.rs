@@ -12,6 +12,7 @@
 mod check;
 mod classical;
 mod directions;
+mod missing;
 mod present;
 mod regression;
 mod resolution;
@@ -47,6 +48,14 @@ impl Body {
         match self {
             Self::Turning => "N m s/rad",
             Self::Sliding => "N s/m",
+        }
+    }
+
+    /// Unit of the drag over the squared speed.
+    fn drag(self) -> &'static str {
+        match self {
+            Self::Turning => "N m s^2/rad^2",
+            Self::Sliding => "N s^2/m^2",
         }
     }
 

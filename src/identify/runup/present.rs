@@ -1,6 +1,7 @@
 //! Names, method, charts and warnings of a run-up.
 
 use super::directions::Directions;
+use super::missing::{Missing, MissingTerm};
 use super::resolution::too_few;
 use super::windows::FittedRows;
 use super::{COLOURED, FreeRun, POOR, RunupOptions};
@@ -135,8 +136,11 @@ pub(super) fn warnings(
             ),
         );
     }
-    impossible(result);
-    shifted(result, fitted);
+    let found = fitted.missing();
+    impossible(result, found.is_some());
+    if let Some(found) = found {
+        missing(result, run, &found);
+    }
     poor(result);
 }
 
@@ -177,36 +181,46 @@ fn coarse(
     );
 }
 
-/// Warns about channels that are shifted in time, with the constants that would allow for it.
-fn shifted(result: &mut Identification, fitted: &FittedRows) {
-    let Some(shift) = fitted.shift() else {
-        return;
-    };
-    let which = match shift.seconds > 0.0 {
-        true => ["torque", "motion"],
-        false => ["motion", "torque"],
-    };
-    let instead: Vec<String> = result
-        .parameters
-        .iter()
-        .zip(&shift.values)
-        .map(|(constant, value)| {
+/// Warns about a term that the equation lacks, with the constants fitted together with it.
+fn missing(result: &mut Identification, run: &FreeRun, found: &Missing) {
+    let with = |term: &MissingTerm| {
+        let pairs = result.parameters.iter().zip(&term.values);
+        let each = pairs.map(|(constant, value)| {
             let unit = constant.estimate.unit();
             format!("{} {} {unit}", constant.name, rounded(*value, 4))
-        })
-        .collect();
-    result.warn(
-        "channels-shifted",
-        format!(
-            "the {} is about {} ms late relative to the {}, or is filtered, which the constants, viscous friction \
-             above all, do not allow for; with the delay as an additional parameter they are {}; record both channels \
-             with one recorder and the same filters",
-            which[0],
-            rounded(1e3 * shift.seconds.abs(), 2),
-            which[1],
-            instead.join(", ")
-        ),
-    );
+        });
+        each.collect::<Vec<_>>().join(", ")
+    };
+    let (code, message) = match found {
+        Missing::Delay(term) => {
+            let which = match term.coefficient < 0.0 {
+                true => ["torque", "motion"],
+                false => ["motion", "torque"],
+            };
+            let message = format!(
+                "the {} is about {} ms late relative to the {}, or is filtered, which the constants, viscous friction \
+                 above all, do not allow for; with the delay as an additional parameter they are {}; record both channels \
+                 with one recorder and the same filters",
+                which[0],
+                rounded(1e3 * term.coefficient.abs(), 2),
+                which[1],
+                with(term)
+            );
+            ("channels-shifted", message)
+        }
+        Missing::Drag(term) => {
+            let message = format!(
+                "the residual shows a torque or force that grows with the square of the speed, as the drag of air does, \
+                 which the constants do not allow for; with a drag of {} {} times the squared speed they are {}; take \
+                 those, or record at speeds so low that drag is small",
+                rounded(term.coefficient, 4),
+                run.body.drag(),
+                with(term)
+            );
+            ("drag", message)
+        }
+    };
+    result.warn(code, message);
 }
 
 /// Warns if the motion does not explain the torque.
@@ -228,7 +242,7 @@ fn poor(result: &mut Identification) {
 }
 
 /// Warns about constants that are significantly negative.
-fn impossible(result: &mut Identification) {
+fn impossible(result: &mut Identification, lacks_term: bool) {
     let constants = result.parameters.iter();
     let impossible: Vec<&str> = constants
         .filter(|c| c.name != "offset" && c.name != "dry_friction_and_offset")
@@ -236,10 +250,11 @@ fn impossible(result: &mut Identification) {
         .map(|c| c.name.as_str())
         .collect();
     if !impossible.is_empty() {
-        let message = format!(
-            "negative: {}; check the signs of both channels and whether something else drives the body",
-            impossible.join(", ")
-        );
+        let why = match lacks_term {
+            true => "the equation lacks a term, named below",
+            false => "check the signs of both channels and whether something else drives the body",
+        };
+        let message = format!("negative: {}; {why}", impossible.join(", "));
         result.warn("impossible", message);
     }
 }

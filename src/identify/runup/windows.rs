@@ -22,17 +22,19 @@ pub(super) struct WindowRows {
     /// Averaged torque or force.
     pub right: Vec<f64>,
     /// Its derivative, per second.
-    slope: Vec<f64>,
+    pub slope: Vec<f64>,
+    /// Averaged `θ' |θ'|`, if the speed is known.
+    pub drag: Option<Vec<f64>>,
     /// Whether the body moves throughout a window, reversing or not.
     pub moves: Vec<bool>,
     /// Whether the body moves one way throughout a window.
     pub clean: Vec<bool>,
     /// Derivative order of each column, if its noise is known.
-    orders: Vec<Option<usize>>,
+    pub orders: Vec<Option<usize>>,
     /// Name of each column.
-    names: Vec<&'static str>,
-    window: Window,
-    variance: f64,
+    pub names: Vec<&'static str>,
+    pub window: Window,
+    pub variance: f64,
 }
 
 /// A fit of the rows.
@@ -82,12 +84,17 @@ impl WindowRows {
         };
         let (columns, orders) = terms(run, directions, split, centres.len(), &column);
         let names = names(run, directions, split).into_iter();
+        let drag = directions.speed.as_ref().map(|speed| {
+            let squares = speed.iter().map(|v| v * v.abs());
+            column(&squares.collect::<Vec<_>>(), 0)
+        });
         Ok(Self {
             half,
             stride,
             columns,
             right: column(run.effort, 0),
             slope: column(run.effort, 1),
+            drag,
             clean: none(&directions.unsure, true),
             moves,
             orders,
@@ -183,7 +190,7 @@ impl WindowRows {
         }
     }
 
-    fn solve(&self, used: &[bool]) -> Result<Corrected, Failure> {
+    pub fn solve(&self, used: &[bool]) -> Result<Corrected, Failure> {
         let errors = Errors {
             noise: &|i, j| self.noise(i, j),
             torque: &|lag| self.torque_errors(lag),
@@ -196,19 +203,6 @@ impl WindowRows {
 
 /// Minimum size of a significant constant in standard uncertainties.
 const CLEAR: f64 = 4.0;
-/// Minimum significant shift in standard uncertainties.
-const CLEAR_SHIFT: f64 = 6.0;
-/// A shift matters if it reduces the residual to less than this fraction, or changes a constant by more than this
-/// number of its standard uncertainties.
-const MATTERS: (f64, f64) = (0.85, 3.0);
-
-/// A shift between the channels.
-pub(super) struct LateChannel {
-    /// Delay of the torque relative to the motion in seconds.
-    pub seconds: f64,
-    /// Parameters fitted together with the shift.
-    pub values: Vec<f64>,
-}
 
 impl FittedRows {
     /// Residual of the used windows relative to the variation of the torque in them.
@@ -230,43 +224,13 @@ impl FittedRows {
     }
 
     /// The values of the used windows.
-    fn used(&self, values: &[f64]) -> Vec<f64> {
+    pub fn used(&self, values: &[f64]) -> Vec<f64> {
         chosen(values, &self.used)
     }
 
     /// The values of the windows without rest.
     pub fn moving(&self, values: &[f64]) -> Vec<f64> {
         chosen(values, &self.rows.moves)
-    }
-
-    /// A shift between the channels, if it matters: `T(t + τ) ≈ T + τ T'`, so that τ is one more coefficient of the
-    /// equation.
-    pub fn shift(&self) -> Option<LateChannel> {
-        let rows = &self.rows;
-        let with = WindowRows {
-            columns: [&rows.columns[..], std::slice::from_ref(&rows.slope)].concat(),
-            orders: [&rows.orders[..], &[None]].concat(),
-            names: [&rows.names[..], &["delay"]].concat(),
-            right: rows.right.clone(),
-            slope: Vec::new(),
-            moves: Vec::new(),
-            clean: Vec::new(),
-            window: rows.window.clone(),
-            ..*rows
-        };
-        let found = with.solve(&self.used).ok()?;
-        let mut values = found.numbers.values().to_vec();
-        let std = |fit: &Corrected, k: usize| fit.numbers.covariance().std(k);
-        let std_s = std(&found, values.len() - 1)?;
-        let seconds = -values.pop()?;
-        let left = |fit: &Corrected| rms(&self.used(&fit.residuals));
-        let is_less = left(&found) < MATTERS.0 * left(&self.fit);
-        let mut changes = values.iter().zip(self.fit.numbers.values()).enumerate();
-        let moves = changes.any(|(k, (new, old))| {
-            std(&self.fit, k).is_some_and(|std| (new - old).abs() > MATTERS.1 * std)
-        });
-        let is_clear = seconds.abs() > CLEAR_SHIFT * std_s;
-        (is_clear && (is_less || moves)).then_some(LateChannel { seconds, values })
     }
 }
 
