@@ -165,6 +165,11 @@ fn a_speed_that_sways_or_is_off_is_said() {
         codes(swaying(50.0, (0.0, 2.0), 0.2), "50"),
         ["order-or-mains"]
     );
+    // 1500 rpm, given as hertz.
+    assert_eq!(
+        codes(swaying(25.0, (0.0, 2.0), 0.0), "1500"),
+        ["fundamental-off"]
+    );
     // A line at 50 Hz that is three times as strong as the order beside it says nothing about the speed.
     assert!(codes(swaying(24.8, (0.0, 2.0), 1.5), "24.8").is_empty());
 }

@@ -317,7 +317,10 @@ fn of_orders(
         .flatten();
     // A speed that sways has no better mean.
     let off = (is_given && is_steady(&[&multiple, &sways]))
-        .then(|| speed::off(record, hz, orders, load.is_some()))
+        .then(|| {
+            let off = speed::off(record, hz, orders, load.is_some());
+            off.or_else(|| multiple::other_unit(record, hz, orders))
+        })
         .flatten();
     let level = is_steady(&[&off, &changing, &sways])
         .then(|| level::warning(record, hz, orders))

@@ -38,9 +38,11 @@ type Convert = fn(f64) -> f64;
 
 /// Keys also known by other names, with the conversion from those.
 const OTHER_TERMS: [(&str, &[&str], Convert); 3] = [
-    ("damping_ratio", &["Q", "quality_factor", "quality"], |q| {
-        0.5 / q
-    }),
+    (
+        "damping_ratio",
+        &["Q", "q_factor", "q_value", "quality_factor", "quality"],
+        |q| 0.5 / q,
+    ),
     (
         "damping_ratio",
         &["log_decrement", "logarithmic_decrement", "decrement"],

@@ -37,6 +37,46 @@ pub(super) fn warning(
     PARTS.iter().find_map(of_part)
 }
 
+/// Hertz per unit in which a speed may have been given as the number of hertz.
+const UNITS: [(&str, f64); 2] = [("rpm", 1.0 / 60.0), ("rad/s", 1.0 / std::f64::consts::TAU)];
+
+/// A warning if the record has no order of the given fundamental, but those of the same number in another unit.
+pub(super) fn other_unit(record: &UniformRecord, given_hz: f64, orders: &[f64]) -> Option<Warning> {
+    let samples = record
+        .samples
+        .part(0..record.samples.count().min(FIRST))
+        .ok()?;
+    let has_any = |hz: f64| {
+        let fitted = fit(
+            &samples,
+            record.rate_hz,
+            0.0,
+            Fundamental::given(hz),
+            orders,
+        );
+        fitted.is_ok_and(|fitted| fitted.components.iter().any(is_sure))
+    };
+    let of_unit = |(unit, hz): &(&str, f64)| {
+        let start_hz = given_hz * hz;
+        let found = refine_fundamental(&samples, record.rate_hz, start_hz, SPAN, &[1.0]).ok()?;
+        has_any(found.frequency_hz).then(|| {
+            Warning::new(
+                "fundamental-off",
+                format!(
+                    "no order of {given} Hz stands out, but a line at {} Hz does: if the speed is {given} {unit}, give \
+                     --fundamental \"{given} {unit}\"",
+                    rounded(found.frequency_hz, 5),
+                    given = rounded(given_hz, 7),
+                ),
+            )
+        })
+    };
+    match has_any(given_hz) {
+        true => None,
+        false => UNITS.iter().find_map(of_unit),
+    }
+}
+
 /// The warning about multiples of one part of the fundamental.
 fn of_part(
     samples: &[f64],

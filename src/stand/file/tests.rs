@@ -113,6 +113,7 @@ fn missing_and_contradicting_entries_are_refused() {
     // 1/(2 Q) and δ/√(4π² + δ²).
     for (other, ratio) in [
         ("Q = 14", "0.03571"),
+        ("q_factor = 14", "0.03571"),
         ("log_decrement = \"0.22\"", "0.03499"),
     ] {
         let decay = twice.replace("damping_ratio = 0.07", other);

@@ -72,6 +72,7 @@ const ANGLE: Dimension = Dimension::new([0, 0, 0, 0, 0, 1]);
 const SPEED: Dimension = Dimension::new([0, 0, -1, 0, 0, 1]);
 const FORCE: Dimension = Dimension::new([1, 1, -2, 0, 0, 0]);
 const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
+const ANGULAR_MOMENTUM: Dimension = Dimension::new([1, 2, -1, 0, 0, 0]);
 const PRESSURE: Dimension = Dimension::new([1, -1, -2, 0, 0, 0]);
 const CURRENT: Dimension = Dimension::new([0, 0, 0, 1, 0, 0]);
 const VOLTAGE: Dimension = Dimension::new([1, 2, -3, -1, 0, 0]);
@@ -198,6 +199,9 @@ pub(super) const SYMBOLS: &[Symbol] = &[
     unit(&[], &["inozf", "ozfin"], INCH * POUND_FORCE / 16.0, TORQUE),
     unit(&["kNm"], &[], 1e3, TORQUE),
     unit(&["MNm"], &[], 1e6, TORQUE),
+    // A torque times a time, for the damping.
+    unit(&["Nms"], &[], 1.0, ANGULAR_MOMENTUM),
+    unit(&["mNms", "Nmms"], &[], 1e-3, ANGULAR_MOMENTUM),
     // Time.
     unit(&["s"], &["sec", "second", "seconds"], 1.0, TIME),
     unit(
