@@ -2,7 +2,7 @@
 
 use torqcomp::identify::Identification;
 
-use super::{Noise, TAU, of, of_decay};
+use super::{Noise, TAU, of, of_decay, ramped, times};
 
 const RATE_HZ: f64 = 5000.0;
 const NATURAL_HZ: f64 = 120.0;
@@ -115,5 +115,22 @@ fn drag_is_no_second_tap() {
             "{drag}: {told:?}"
         );
         assert!(told.contains(&"amplitude-dependent"), "{drag}: {told:?}");
+    }
+}
+
+/// A load taken off over 2.5 and 3.6 periods, as by hand: what looks like a baseline is the load.
+#[test]
+fn a_load_let_go_slowly_is_no_free_decay() {
+    let mut noise = Noise(15);
+    for length_s in [0.014, 0.02] {
+        for _ in 0..3 {
+            let taken = |t: f64| ramped(181.4, 0.0135, t - 0.05) / length_s;
+            let load = |t: f64| 1.0 - taken(t) + taken(t - length_s);
+            let record = times(4000, RATE_HZ).into_iter().map(load).collect();
+            let found = identified(record, &mut noise, 0.003);
+            let ratio = of(&found, "damping_ratio");
+            let off = (ratio.value() - 0.0135).abs();
+            assert!(off < 4.0 * ratio.std().unwrap(), "{length_s}: {ratio:?}");
+        }
     }
 }

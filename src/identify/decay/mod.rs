@@ -143,7 +143,15 @@ fn found<'a>(
         stretches.clone_from(&recorded);
         found = search::search(stretches, wanted, lines)?;
     }
-    let (found, beginnings) = anew::cut(found, stretches, (wanted, lines))?;
+    // What is driven at first looks like a baseline that moves.
+    let with_baseline = found.has_baseline.then(|| suffixes(&recorded, stretches));
+    let (mut found, mut beginnings) = anew::cut(found, stretches, (wanted, lines))?;
+    if let Some(mut whole) = with_baseline.filter(|_| beginnings.is_empty()) {
+        (found, beginnings) = anew::cut(found, &mut whole, (wanted, lines))?;
+        if !beginnings.is_empty() {
+            *stretches = whole;
+        }
+    }
     let is_split = found.fit.poles.len() > 1 || !beginnings.is_empty();
     if wanted.count.is_none_or(|modes| modes == 1)
         && (is_split || dependence::is_dry(&found.fit, stretches)?)
@@ -152,6 +160,15 @@ fn found<'a>(
         return Ok(with_friction(moving, stretches));
     }
     Ok((found, beginnings))
+}
+
+/// The segments as recorded, without the first samples that fitted ones lack.
+fn suffixes(recorded: &[Stretch], fitted: &[Stretch]) -> Vec<Stretch> {
+    let pairs = recorded.iter().zip(fitted);
+    let suffix = |(whole, fitted): (&Stretch, &Stretch)| {
+        whole.later(whole.values.len() - fitted.values.len())
+    };
+    pairs.map(suffix).collect()
 }
 
 /// Adds the modes, the strongest first, with their constants.
