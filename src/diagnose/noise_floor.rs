@@ -12,6 +12,7 @@ use super::residual_tests::{autocorrelation, without_mean};
 use super::spectra::{ONLY_NOISE, spectra};
 use crate::identify::Motion;
 use torqcomp_dsp::dot;
+use torqcomp_dsp::quality::quantisation::quantisation;
 
 /// The noise of the held-out records.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,6 +28,8 @@ pub enum NoiseFloorSource {
     Periods,
     /// Frequencies above the signal; white noise is assumed.
     OutOfBand,
+    /// The resolution of the record, if the noise is smaller than its rounding error.
+    Resolution,
 }
 
 /// Allowed relative difference of the input's power between periods.
@@ -49,6 +52,9 @@ const SIGNAL: f64 = 0.2;
 
 /// Ratio of two parts of a spectrum up to which it is flat.
 const FLAT: f64 = 1.5;
+/// Density of noise on the applied quantity relative to the mean density, up to which it is told from excitation, if the
+/// whole upper half of the spectrum is flat.
+const SHELF: f64 = 0.01;
 /// Maximum noise power gain of a stand: near zero damping the integral corresponds to a decay that never settles.
 const MOST_PASSED: f64 = 10.0;
 
@@ -100,6 +106,11 @@ impl FittedModel {
 }
 
 impl NoiseFloor {
+    /// Whether it is the rounding error of the records.
+    pub fn is_rounding(self) -> bool {
+        self.from == NoiseFloorSource::Resolution
+    }
+
     /// Noise of the records: from the differences between periods if every input is periodic, otherwise from the top of
     /// the spectrum, where the plain stand predicts no signal. The noise on the applied quantity, filtered by the
     /// stand, is added to either: it is not in the records, but in the response of a model to the recorded input.
@@ -113,10 +124,24 @@ impl NoiseFloor {
             let record = &r.record;
             of_periods(record, record.measured_in_range(), mode)
         });
-        Self::pooled(periods, NoiseFloorSource::Periods).or_else(|| {
+        let found = Self::pooled(periods, NoiseFloorSource::Periods).or_else(|| {
             let found = residuals.iter().filter_map(out_of_band);
             Self::pooled(found.map(Some), NoiseFloorSource::OutOfBand)
-        })
+        })?;
+        Some(found.or_rounding(residuals))
+    }
+
+    /// At least the rounding error of the records, `q²/12` for steps `q`: where noise is smaller than a step, the error
+    /// follows the signal, and is the same in every period (B. Widrow, *IRE Trans. Circuit Theory* 3 (1956), 266).
+    fn or_rounding(self, residuals: &[RecordResidual]) -> Self {
+        let rounding = residuals.iter().map(|r| {
+            let step = quantisation(r.record.measured_in_range()).map_or(0.0, |found| found.step);
+            Some((step * step / 12.0, r.record.count()))
+        });
+        let rounding = Self::pooled(rounding, NoiseFloorSource::Resolution);
+        rounding
+            .filter(|rounding| rounding.rms > self.rms)
+            .unwrap_or(self)
     }
 
     /// Noise in the residuals of a model, from differences between periods: disturbances that are not periodic with the
@@ -124,7 +149,7 @@ impl NoiseFloor {
     pub fn of_residuals(residuals: &[RecordResidual], passage: &NoisePassage) -> Option<Self> {
         let found = residuals.iter();
         let found = found.map(|r| of_periods(&r.record, &r.samples, &passage.first));
-        let floor = Self::pooled(found, NoiseFloorSource::Periods)?;
+        let floor = Self::pooled(found, NoiseFloorSource::Periods)?.or_rounding(residuals);
         Some(floor.with_applied(residuals, passage))
     }
 
@@ -170,12 +195,15 @@ pub fn noise_of_input(input: &[f64]) -> f64 {
         let count = range.len().max(1) as f64;
         power[range].iter().sum::<f64>() / count
     };
-    let [below, top] = [
-        mean(lines * 80 / 100..lines * 88 / 100),
-        mean(lines * 88 / 100..lines * 97 / 100),
-    ];
-    let is_flat = below < FLAT * top && top < FLAT * below;
-    match is_flat && top < ONLY_NOISE * mean(0..lines) {
+    let part = |from: usize, to: usize| mean(lines * from / 100..lines * to / 100);
+    let is_flat = |parts: &[f64]| {
+        let least = parts.iter().copied().fold(f64::INFINITY, f64::min);
+        parts.iter().all(|power| *power < FLAT * least)
+    };
+    let [below, top] = [part(80, 88), part(88, 97)];
+    let is_shelf = is_flat(&[part(50, 65), part(65, 80), below, top]);
+    let most = if is_shelf { SHELF } else { ONLY_NOISE };
+    match is_flat(&[below, top]) && top < most * mean(0..lines) {
         true => top * lines as f64,
         false => 0.0,
     }
@@ -378,6 +406,9 @@ mod tests {
             assert!((0.0045..0.0055).contains(&found), "{found}");
             assert!(noise_of_input(&made(clean)).sqrt() < 1e-4);
         }
+        // Twice the noise that a short range of frequencies at the top would tell.
+        let found = noise_of_input(&made(&|i| smooth(i) + 0.04 * noise(i))).sqrt();
+        assert!((0.036..0.044).contains(&found), "{found}");
         // White excitation is not noise.
         assert!(noise_of_input(&made(&noise)) < 1e-12);
     }
@@ -400,5 +431,21 @@ mod tests {
         record.record.measured = std::sync::Arc::new(changed.collect());
         let floor = NoiseFloor::of(&[record], &passage()).expect("a floor");
         assert!((0.9..1.1).contains(&(floor.rms / NOISE)), "{}", floor.rms);
+    }
+
+    #[test]
+    fn the_rounding_error_is_noise() {
+        let times_s: Vec<f64> = (0..40).map(|k| 1.5 * f64::from(k)).collect();
+        let mut record = steps(&times_s, 64_000);
+        let measured = record.record.measured.iter();
+        let rounded = measured.map(|y| 0.05 * (y / 0.05).round());
+        record.record.measured = std::sync::Arc::new(rounded.collect());
+        let floor = NoiseFloor::of(&[record], &passage()).expect("a floor");
+        let expected = 0.05 / 12.0_f64.sqrt();
+        assert!(
+            (0.95..1.05).contains(&(floor.rms / expected)),
+            "{}",
+            floor.rms
+        );
     }
 }

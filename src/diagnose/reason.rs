@@ -97,6 +97,8 @@ pub enum Reason {
     },
     /// Its motion diverges on the held-out records.
     Diverges,
+    /// The plain stand leaves no more than the rounding error of the records.
+    BelowResolution,
     NoneAccepted,
 }
 
@@ -171,6 +173,9 @@ impl Reason {
             ),
             Self::NotConfirmed { change } => not_confirmed(*change),
             Self::Diverges => "its motion diverges on the hold-out records".to_owned(),
+            Self::BelowResolution => {
+                "the plain stand leaves no more than the rounding error of the records".to_owned()
+            }
             Self::NoneAccepted => "no effect is accepted".to_owned(),
         }
     }

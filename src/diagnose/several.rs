@@ -6,7 +6,7 @@ use super::acceptance::{no_gain, refusal};
 use super::applied_noise::AppliedNoise;
 use super::exchange::MANY;
 use super::guard_models::GuardModel;
-use super::noise_floor::NoiseFloorSource;
+use super::noise_floor::{NoiseFloor, NoiseFloorSource};
 use super::pairs::best_pairs;
 use super::reason::{Reason, Status};
 use super::records::Records;
@@ -42,7 +42,13 @@ impl SearchState {
     pub(super) fn build(&mut self, coarse: usize, workers: Workers) {
         let (plain, records) = (self.before.clone(), self.records.clone());
         let base = BaseModel::of(plain.clone(), &records);
-        let round = search::try_all(&base, &self.records, workers);
+        let mut round = search::try_all(&base, &self.records, workers);
+        let is_rounding = self.noise_floor.is_some_and(NoiseFloor::is_rounding);
+        if is_rounding && !self.is_worthwhile(&plain, &self.tests_before) {
+            reject_all(&mut round.tried, |_| Reason::BelowResolution);
+            self.rounds.push(round.tried);
+            return;
+        }
         self.rounds.push(round.tried.clone());
         if let Some(guard) = self.only_law(&base, round.accepted(), workers) {
             return self.withdraw(guard, self.before.clone());
@@ -223,10 +229,13 @@ impl SearchState {
     }
 
     /// Whether a model leaves enough for another effect: something above the noise, or a residual that is not just
-    /// noise and exceeds the differences between periods.
+    /// noise and exceeds the differences between periods. A rounding error is neither white nor independent of the input.
     pub(super) fn is_worthwhile(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
-        let is_noise = tests.white && tests.independent_of_input;
         let floor = self.noise_floor;
+        if floor.is_some_and(NoiseFloor::is_rounding) {
+            return remains(model, tests, floor);
+        }
+        let is_noise = tests.white && tests.independent_of_input;
         let of_periods = floor.filter(|floor| floor.from == NoiseFloorSource::Periods);
         let is_at_floor =
             of_periods.is_some_and(|floor| model.compared_rms() <= ALL_NOISE * floor.rms);

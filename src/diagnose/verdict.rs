@@ -202,7 +202,7 @@ pub fn remains(model: &ScoredModel, tests: &ResidualTests, floor: Option<NoiseFl
     };
     let ratio = model.compared_rms() / model.with_uncertain(floor);
     let is_enough = match floor.from {
-        NoiseFloorSource::Periods => true,
+        NoiseFloorSource::Periods | NoiseFloorSource::Resolution => true,
         NoiseFloorSource::OutOfBand => is_dependent || ratio > FAR_ABOVE && !tests.white,
     };
     ratio > AT_FLOOR && is_enough
@@ -210,11 +210,12 @@ pub fn remains(model: &ScoredModel, tests: &ResidualTests, floor: Option<NoiseFl
 
 impl SearchState {
     /// Whether something is left, above the noise or hidden in it. Changes over a record also raise a floor from
-    /// differences between its periods. They are no reason to look for a second effect, as no effect of the list causes
+    /// differences between its periods; a rounding error changes with the signal. They are no reason to look for a second effect, as no effect of the list causes
     /// them.
     fn leaves(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
         let is_above = remains(model, tests, self.noise_floor);
-        is_above && !self.is_coloured_noise(model, tests) || tests.changes()
+        let is_rounding = self.noise_floor.is_some_and(NoiseFloor::is_rounding);
+        is_above && !self.is_coloured_noise(model, tests) || tests.changes() && !is_rounding
     }
 
     /// Whether the residual of the plain stand exceeds the noise floor only because that assumes white noise: no test

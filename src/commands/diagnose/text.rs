@@ -328,6 +328,9 @@ pub fn error_sentences(diagnosis: &Diagnosis) -> Vec<String> {
     });
     let from = match error.noise_floor_from {
         Some(NoiseFloorSource::Periods) => "differences between periods of the record",
+        Some(NoiseFloorSource::Resolution) => {
+            "the resolution of the record, whose rounding error exceeds the noise"
+        }
         _ => "the frequencies without signal",
     };
     let floor = match error.noise_floor_rms {
