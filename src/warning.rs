@@ -86,6 +86,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["records-apart", "no single stand fits both training and hold-out records", "use records of one stand and one setting"],
         ["no-torques-tried", "the stand file does not say how torques in the stand affect the record, so diagnose did not try them", "give mode shapes instead of residues, or record the displacement"],
         ["resampled", "channels with different time stamps were interpolated to a common grid", "record them with one clock"],
+        ["effects-leave-constants-open", "with the effects found, the training records determine a constant of the stand much less well than without them", "keep the constants from a record without the effects, or train on more levels"],
         ["training-leaves-constants-open", "the training records do not determine all constants", "train on records that excite the resonance"],
         ["unit-assumed", "a column without a unit was assumed to be in the unit that the stand expects", "give --unit"],
     ]),

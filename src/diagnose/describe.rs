@@ -251,7 +251,7 @@ pub fn warnings(found: &SearchState, verdict: Verdict) -> Vec<Warning> {
     let apart = is_open.then(|| records_apart(before)).flatten();
     apart
         .into_iter()
-        .chain(uncertain_constants(before))
+        .chain(uncertain_constants(found))
         .collect()
 }
 
@@ -292,29 +292,43 @@ fn apart([train, holdout]: &[PlainStand; 2]) -> String {
     )
 }
 
-/// Constants too uncertain from the training records for the hold-out error to reveal a missing effect.
-fn uncertain_constants(before: &ScoredModel) -> Option<Warning> {
+/// Constants too uncertain from the training records for the hold-out error to reveal a missing effect, or uncertain beside
+/// effects that may stand in for them.
+fn uncertain_constants(found: &SearchState) -> Option<Warning> {
+    if let Some(open) = open_constants(&found.before) {
+        return Some(Warning::new(
+            "training-leaves-constants-open",
+            format!(
+                "the training records determine {open}: that, and not a missing effect, may cause the hold-out error; \
+                 train on records that excite the resonance"
+            ),
+        ));
+    }
+    let open = open_constants(&found.after)?;
+    Some(Warning::new(
+        "effects-leave-constants-open",
+        format!(
+            "with {}, the training records determine {open}: the effects make up for wrong constants, and their parameters \
+             are as uncertain; keep the constants from a record without them, or train on more levels",
+            found.after.effect_names().join(" and ")
+        ),
+    ))
+}
+
+/// The constants that a fit leaves open, as text.
+fn open_constants(model: &ScoredModel) -> Option<String> {
     let constants = ["natural frequency", "damping ratio"];
     let constants = constants.into_iter().zip(MOST_UNCERTAIN).enumerate();
     let uncertain = constants.filter_map(|(k, (name, most))| {
-        let plain = &before.fitted;
-        match plain.std[k].map(|s| s / plain.values[k].abs()) {
+        let fitted = &model.fitted;
+        match fitted.std[k].map(|s| s / fitted.values[k].abs()) {
             Some(relative) if relative <= most => None,
             Some(relative) => Some(format!("the {name} to ± {}", print::relative(relative, 2))),
             None => Some(format!("the {name} not at all")),
         }
     });
     let uncertain: Vec<String> = uncertain.collect();
-    (!uncertain.is_empty()).then(|| {
-        Warning::new(
-            "training-leaves-constants-open",
-            format!(
-                "the training records determine {}: that, and not a missing effect, may cause the hold-out error; \
-                 train on records that excite the resonance",
-                uncertain.join(" and ")
-            ),
-        )
-    })
+    (!uncertain.is_empty()).then(|| uncertain.join(" and "))
 }
 
 #[cfg(test)]

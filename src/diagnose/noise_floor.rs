@@ -229,11 +229,8 @@ fn of_periods(record: &StandRecord, y: &[f64], mode: &Mode) -> Option<MeanSquare
     let count = differences.len();
     (count >= period).then(|| {
         let sections: Vec<&[f64]> = differences.chunks_exact(period / SECTIONS).collect();
-        let [undisturbed, whole] = [mean_square(&undisturbed(&sections)), mean_square(&sections)];
-        match undisturbed < DISTURBED * whole {
-            true => (0.5 * undisturbed, count),
-            false => (0.5 * mean_square(&[&differences]), count),
-        }
+        let squares = undisturbed(&sections).unwrap_or_else(|| mean_square(&[&differences]));
+        (0.5 * squares, count)
     })
 }
 
@@ -243,21 +240,25 @@ fn mean_square(sections: &[&[f64]]) -> f64 {
     squares.sum::<f64>() / count as f64
 }
 
-/// The sections whose power is not significantly above that of the quietest one: a change of the stand makes some periods
-/// differ, which is no noise. Neighbouring samples are correlated: `n` of them have `n / Σ ρ²` degrees of freedom
-/// (M. S. Bartlett, *Suppl. J. R. Stat. Soc.* 8 (1946), 27).
-fn undisturbed<'a>(sections: &[&'a [f64]]) -> Vec<&'a [f64]> {
+/// Mean square of the sections whose power is not significantly above that of the quietest one, if it is much less than of
+/// all: a change of the stand makes some periods differ, which is no noise. Neighbouring samples are correlated: `n` of them
+/// have `n / Σ ρ²` degrees of freedom (M. S. Bartlett, *Suppl. J. R. Stat. Soc.* 8 (1946), 27).
+fn undisturbed(sections: &[&[f64]]) -> Option<f64> {
     let power = |section: &&[f64]| mean_square(&[section]);
-    let quietest = sections.iter().min_by(|a, b| power(a).total_cmp(&power(b)));
-    let Some(quietest) = quietest else {
-        return Vec::new();
-    };
-    let [least, freedom] = [power(quietest), degrees_of_freedom(quietest)];
+    let quietest = sections
+        .iter()
+        .min_by(|a, b| power(a).total_cmp(&power(b)))?;
+    let (least, most) = (power(quietest), DISTURBED * mean_square(sections));
+    if least >= most {
+        return None;
+    }
+    let freedom = degrees_of_freedom(quietest);
     let is_alike = |section: &&&[f64]| {
         let law = FisherSnedecor::new(degrees_of_freedom(section), freedom);
         law.is_ok_and(|law| power(section) <= law.inverse_cdf(1.0 - BY_CHANCE) * least)
     };
-    sections.iter().filter(is_alike).copied().collect()
+    let alike: Vec<&[f64]> = sections.iter().filter(is_alike).copied().collect();
+    Some(mean_square(&alike)).filter(|squares| *squares < most)
 }
 
 fn degrees_of_freedom(section: &[f64]) -> f64 {

@@ -5,6 +5,8 @@ use std::collections::HashMap;
 use super::{NONE, Point};
 use crate::failure::{ErrorCode, Failure};
 
+/// Minimum number of loaded rows of a series, on average, that tells its sensitivity.
+const FEWEST_LOADED: usize = 2;
 /// Maximum number of series or mountings open at any row.
 const MOST_OPEN: usize = 100;
 
@@ -36,15 +38,21 @@ impl Groups {
         groups
     }
 
-    /// Groups that may differ in sensitivity: mountings, or series at a single one. Rows without load belong to the series
-    /// before them, or to the first one, as they do not show it.
+    /// Groups that may differ in sensitivity: mountings, or series at a single one that have two loaded rows each on average,
+    /// as a single row does not tell it from noise. Rows without load belong to the series before them, or to the first one,
+    /// as they do not show it.
     pub fn of_sensitivity(points: &[Point], largest: f64) -> Self {
         let mountings = Self::of(points.iter().map(|p| p.position));
         if mountings.count() > 0 {
             return mountings;
         }
         let is_loaded = |p: &&Point| p.load.abs() > NONE * largest;
-        let first = points.iter().find(is_loaded).map_or(0, |p| p.series);
+        let loaded: Vec<usize> = points.iter().filter(is_loaded).map(|p| p.series).collect();
+        let series = loaded.chunk_by(|a, b| a == b).count();
+        if loaded.len() < FEWEST_LOADED * series {
+            return mountings;
+        }
+        let first = loaded.first().copied().unwrap_or(0);
         Self::of(points.iter().scan(first, |series, p| {
             *series = if is_loaded(&p) { p.series } else { *series };
             Some(*series)
