@@ -443,6 +443,7 @@ mod tests {
         record.record.measured = std::sync::Arc::new(rounded.collect());
         let floor = NoiseFloor::of(&[record], &passage()).expect("a floor");
         let expected = 0.05 / 12.0_f64.sqrt();
+        assert_eq!(floor.from, NoiseFloorSource::Resolution);
         assert!(
             (0.95..1.05).contains(&(floor.rms / expected)),
             "{}",

@@ -210,8 +210,8 @@ pub fn remains(model: &ScoredModel, tests: &ResidualTests, floor: Option<NoiseFl
 
 impl SearchState {
     /// Whether something is left, above the noise or hidden in it. Changes over a record also raise a floor from
-    /// differences between its periods; a rounding error changes with the signal. They are no reason to look for a second effect, as no effect of the list causes
-    /// them.
+    /// differences between its periods, while a rounding error changes with the signal by itself. They are no reason to
+    /// look for a second effect, as no effect of the list causes them.
     fn leaves(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
         let is_above = remains(model, tests, self.noise_floor);
         let is_rounding = self.noise_floor.is_some_and(NoiseFloor::is_rounding);

@@ -47,9 +47,7 @@ impl StampGrid {
             ..self
         })
     }
-}
 
-impl StampGrid {
     /// Whether samples arrived in blocks at this rate.
     fn has_blocks_at(&self, rate_hz: f64) -> bool {
         let rate = rate_hz * self.seconds_per_unit;

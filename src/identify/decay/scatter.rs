@@ -42,7 +42,7 @@ pub(super) fn widened(
             .iter()
             .filter(|(s, _)| amplitude(*s) > ABSENT * largest);
         let constants = rings.filter_map(|(_, own)| Some((own.fit.values[i], own.fit.std[i]?)));
-        let scatter = Scatter::of(&constants.collect::<Vec<_>>());
+        let scatter = BetweenDecays::of(&constants.collect::<Vec<_>>());
         if let Some((scatter, std)) = scatter.zip(fit.fit.covariance.std(i)) {
             *factor = scatter.factor(std);
             result.method.push(format!(
@@ -50,7 +50,7 @@ pub(super) fn widened(
                  explains; its uncertainty allows for that",
                 ["decay rate", "frequency"][i % 2],
                 rounded(fit.poles[i / 2].frequency_hz(), 5),
-                rounded(100.0 * scatter.between / fit.fit.values[i].abs(), 2)
+                rounded(100.0 * scatter.std / fit.fit.values[i].abs(), 2)
             ));
         }
     }
@@ -60,14 +60,14 @@ pub(super) fn widened(
 
 /// Significant scatter of a constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Scatter {
+struct BetweenDecays {
     /// Its standard deviation between decays.
-    between: f64,
+    std: f64,
     /// Number of decays of equal weight.
     decays: f64,
 }
 
-impl Scatter {
+impl BetweenDecays {
     /// Of estimates and their standard uncertainties; `None` if noise explains it.
     fn of(estimates: &[(f64, f64)]) -> Option<Self> {
         let freedom = estimates.len().checked_sub(1).filter(|n| *n > 0)? as f64;
@@ -83,14 +83,14 @@ impl Scatter {
         let by_chance = ChiSquared::new(freedom).ok()?.inverse_cdf(1.0 - CHANCE);
         let decays = sum * sum / squares;
         (off > by_chance).then(|| Self {
-            between: ((off - freedom) / (sum - sum / decays)).sqrt(),
+            std: ((off - freedom) / (sum - sum / decays)).sqrt(),
             decays,
         })
     }
 
     /// Factor of a standard uncertainty that comes from noise alone.
     fn factor(&self, std: f64) -> f64 {
-        let (own, between) = (std * std, self.between.powi(2) / self.decays);
+        let (own, between) = (std * std, self.std.powi(2) / self.decays);
         let share = between / (own + between);
         let freedom = (self.decays - 1.0).max(1.0) / (share * share);
         (1.0 + between / own).sqrt() * student(freedom)
@@ -104,10 +104,13 @@ mod tests {
     #[test]
     fn scatter_far_beyond_noise_is_that_of_the_mean_with_students_factor() {
         // Standard deviation 1, so 1/√3 of the mean; Student's factor is 4.303/1.960.
-        let found = Scatter::of(&[(9.0, 1e-3), (10.0, 1e-3), (11.0, 1e-3)]).unwrap();
+        let found = BetweenDecays::of(&[(9.0, 1e-3), (10.0, 1e-3), (11.0, 1e-3)]).unwrap();
         let std = 1e-3 / 3.0_f64.sqrt() * found.factor(1e-3 / 3.0_f64.sqrt());
         assert!((std / (2.195 / 3.0_f64.sqrt()) - 1.0).abs() < 1e-3, "{std}");
-        assert_eq!(Scatter::of(&[(9.0, 1.0), (10.0, 1.0), (11.0, 1.0)]), None);
-        assert_eq!(Scatter::of(&[(9.0, 1.0)]), None);
+        assert_eq!(
+            BetweenDecays::of(&[(9.0, 1.0), (10.0, 1.0), (11.0, 1.0)]),
+            None
+        );
+        assert_eq!(BetweenDecays::of(&[(9.0, 1.0)]), None);
     }
 }
