@@ -63,7 +63,7 @@ impl SearchState {
 
     /// The best model with one effect exchanged or refitted, if it is better than the current one, or as good and first
     /// in the list; what only takes out noise on the applied quantity is no reason for more parameters. While a residual
-    /// remains, any effect may replace it; otherwise only one that resembles it.
+    /// remains, or if the effect lacks what makes it one, any may replace it; otherwise only one that resembles it.
     fn other_effects(
         &self,
         seen: &[Vec<&'static str>],
@@ -73,20 +73,26 @@ impl SearchState {
         let present = self.after.fitted.structure.added();
         let is_open = self.is_worthwhile(&self.after, &self.tests);
         let is_long = present.len() > MOST_OPEN || self.records.substeps() > FINEST_OPEN * coarse;
-        if present.len() < 2 || !self.settled || is_open && is_long {
+        if present.len() < 2 || !self.settled {
             return None;
         }
+        let declared = self.after.fitted.structure.declared;
         let silent = workers.silent();
         let without = self.after.without_each(&self.records, workers.threads);
         let noise = AppliedNoise::of(&self.records);
         let mut found = Vec::new();
-        for (form, less) in present.iter().zip(without) {
+        for (k, (form, less)) in present.iter().zip(without).enumerate() {
             let Some(less) = less else { continue };
+            // Without what makes it this effect, it only has the shape of another.
+            let is_void = self.after.insignificant_of(declared + k).is_some();
+            if is_open && is_long && !is_void {
+                continue;
+            }
             let effect = form.effect;
             let base = BaseModel::of(less.clone(), &self.records);
             let is_alike = |e: &Effect| e.name == effect.name || effect.resembles(e);
             let round = try_effects(&base, is_alike, &AMONG_ALIKE, &self.records, silent);
-            let others = is_open.then(|| {
+            let others = (is_open || is_void).then(|| {
                 let among = |e: &Effect| !is_alike(e);
                 try_effects(&base, among, &FOR_EXCHANGE, &self.records, silent)
             });

@@ -47,8 +47,10 @@ pub struct RecordResidual {
 /// Effort of a fit.
 #[derive(Clone, Copy)]
 pub struct FitEffort {
-    /// Maximum iterations, each with one evaluation per parameter and one more.
+    /// Maximum number of evaluations, in multiples of one per parameter and one more.
     pub iterations: usize,
+    /// Maximum number of steps that reduce the error.
+    pub steps: usize,
     /// Whether to repeat the fit after correcting the initial states of the records.
     pub corrects_start: bool,
 }
@@ -58,6 +60,7 @@ impl FitEffort {
     pub const fn full(iterations: usize) -> Self {
         Self {
             iterations,
+            steps: usize::MAX,
             corrects_start: true,
         }
     }
@@ -66,6 +69,7 @@ impl FitEffort {
     pub const fn brief(iterations: usize) -> Self {
         Self {
             iterations,
+            steps: iterations + 1,
             corrects_start: false,
         }
     }
@@ -75,6 +79,8 @@ impl FitEffort {
 /// larger. Models are compared by several variances.
 const TOLERANCE: f64 = 1e-6;
 const TOLERANCE_OF_VARIANCE: f64 = 0.05;
+/// Successive steps that only update the derivatives: two or three are nearly as good as new ones, and far cheaper.
+const MOST_UPDATES: usize = 3;
 /// Correction of a record's initial state, relative to the RMS residual, that makes a second fit worthwhile.
 const START_MATTERS: f64 = 0.05;
 /// Maximum number of such corrections or refits.
@@ -173,6 +179,8 @@ fn minimize(
     let count: usize = records.iter().map(StandRecord::count).sum();
     let options = Options {
         differences: Differences::Forward,
+        most_updates: MOST_UPDATES,
+        most_steps: effort.steps,
         tolerance: TOLERANCE.max(TOLERANCE_OF_VARIANCE / count as f64),
         most_evaluations: effort.iterations * (parameters.len() + 1),
         ..Options::default()

@@ -36,8 +36,8 @@ pub struct GuardModel {
 const LEAST_SIGNIFICANCE: f64 = 3.0;
 /// Minimum reduction of the criterion from an effect to a guard model.
 const LEAST_REDUCTION: f64 = 20.0;
-/// Largest fraction of an effect's excess error power that a guard model may leave: a law that explains half of it is
-/// not its cause.
+/// Largest fraction of an effect's excess error power that a guard model may leave, unless it has fewer parameters: a law
+/// that explains half of it is not its cause.
 const LEFT: f64 = 0.5;
 
 impl GuardModel {
@@ -67,7 +67,7 @@ impl GuardModel {
         Some(Self {
             effect,
             equation: effect.equation,
-            with: Vec::new(),
+            with: base.effect_names(),
             errors: model.errors(),
             unit: model.fitted.structure.context.units.printed(),
             parameters: model.last_parameters(),
@@ -89,5 +89,6 @@ impl GuardModel {
 fn outdoes(guard: &ScoredModel, accepted: &ScoredModel, noise_rms: f64) -> bool {
     guard.against(accepted).significance() >= LEAST_SIGNIFICANCE
         && guard.criterion() + LEAST_REDUCTION <= accepted.criterion()
-        && guard.excess_power(noise_rms) <= LEFT * accepted.excess_power(noise_rms)
+        && (guard.excess_power(noise_rms) <= LEFT * accepted.excess_power(noise_rms)
+            || guard.fitted.values.len() < accepted.fitted.values.len())
 }

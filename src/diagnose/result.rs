@@ -177,10 +177,7 @@ impl Diagnosis {
             lines: lines.into_iter().map(|line| line.over(unit)).collect(),
             levels,
         };
-        let mut suspected = found.suspected.take();
-        if let Some(guard) = &mut suspected {
-            guard.with.clone_from(&effects);
-        }
+        let suspected = found.suspected.take();
         Self {
             verdict,
             effects,

@@ -308,7 +308,10 @@ impl SearchState {
             self.withdraw(guard, self.before.clone());
             return;
         }
-        if count == 0 || !is_left {
+        // An effect with many parameters may imitate such a law down to the noise.
+        let added = self.after.fitted.structure.added();
+        let is_asked = |k: usize| is_left || added[k].moved() >= MANY;
+        if !(0..count).any(is_asked) {
             return;
         }
         let records = &self.records;
@@ -317,12 +320,15 @@ impl SearchState {
             let fits = GuardModel::fits(&base, records, workers);
             GuardModel::best(fits, model, against, noise_rms)
         };
-        let fewer = || self.without.iter().flatten();
-        let instead =
-            fewer().find_map(|less| Some((beside(less, against.as_ref())?, less.clone())));
+        let each = self.without.iter().enumerate();
+        let instead = each
+            .filter(|(k, _)| is_asked(*k))
+            .filter_map(|(_, less)| less.as_ref())
+            .find_map(|less| Some((beside(less, against.as_ref())?, less.clone())));
         match instead {
             Some((guard, less)) => self.withdraw(guard, less),
-            None => self.suspected = beside(&self.after, None),
+            None if is_left => self.suspected = beside(&self.after, None),
+            None => {}
         }
     }
 

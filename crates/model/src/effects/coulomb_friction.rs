@@ -115,6 +115,9 @@ fn decay(a: f64, b: f64) -> f64 {
     if a.min(a - b) > LARGE {
         return a - b;
     }
+    if b - a > VANISHED {
+        return 0.0;
+    }
     let sine = if a > LARGE {
         0.5 * (a - b).exp()
     } else if a < SMALL {
@@ -134,6 +137,8 @@ fn decay(a: f64, b: f64) -> f64 {
 const SMALL: f64 = 0.03;
 /// Above it, `sinh` equals half the exponential to the last bit.
 const LARGE: f64 = 20.0;
+/// The exponential of less than its negative is zero or subnormal, and slow to compute.
+const VANISHED: f64 = 700.0;
 
 /// `x (1 + c₀ x² (1 + c₁ x² (1 + c₂ x²)))`.
 fn series(x: f64, c: [f64; 3]) -> f64 {

@@ -76,6 +76,9 @@ pub(super) static EFFECT: Effect = Effect {
     ],
 };
 
+/// Above it, the exponential is lost in the digits of 1, and far above it is slow to underflow.
+const FALLEN: f64 = 40.0;
+
 struct Falling {
     torque: f64,
     drop: f64,
@@ -96,6 +99,9 @@ impl Falling {
     /// Drop of the friction at a speed.
     fn fallen(&self, speed: f64) -> f64 {
         let part = speed / self.stribeck_speed;
+        if part * part > FALLEN {
+            return self.torque * self.drop;
+        }
         // It runs in every step of hundreds of fits; exp_m1 takes three times as long, and its digits are lost in F.
         self.torque * self.drop * (1.0 - (-part * part).exp())
     }

@@ -1,6 +1,6 @@
 //! Nonlinear least squares within bounds.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::covariance::covariance;
 use super::jacobian::{Derivatives, jacobian};
@@ -14,6 +14,11 @@ use super::{Differences, Fit, FitError, Parameter, Residuals, StopReason};
 pub struct Options {
     /// Finite-difference scheme for problems without derivatives.
     pub differences: Differences,
+    /// Maximum number of successive steps that only update the derivatives, before these are taken anew (C. G. Broyden,
+    /// Math. Comput. 19 (1965), 577): one evaluation in place of one per parameter. An end is confirmed by new ones.
+    pub most_updates: usize,
+    /// Maximum number of steps that reduce the sum of squares.
+    pub most_steps: usize,
     /// Maximum number of evaluations of the residuals.
     pub most_evaluations: usize,
     /// Relative reduction of the sum of squares, and relative step, below which the fit has converged.
@@ -28,6 +33,8 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             differences: Differences::Central,
+            most_updates: 0,
+            most_steps: usize::MAX,
             most_evaluations: 20_000,
             tolerance: 1e-12,
             weights: None,
@@ -42,6 +49,8 @@ const FIRST_DAMPING: f64 = 1e-3;
 const MOST_DAMPING: f64 = 1e24;
 /// Cosine of the angle between residuals and a column below which they are orthogonal.
 const RIGHT_ANGLE: f64 = 1e-10;
+/// Minimum ratio of the gain of a step to the predicted one for an update of the derivatives.
+const WELL_PREDICTED: f64 = 0.25;
 
 /// Finds the parameters that minimise the sum of squares of the residuals.
 ///
@@ -77,6 +86,11 @@ struct State<'a> {
     residuals: Vec<f64>,
     cost: f64,
     cost_at_start: f64,
+    /// Derivatives of the residuals with respect to the free parameters, and the number of updates since they were taken.
+    matrix: DMatrix<f64>,
+    updates: usize,
+    /// Steps that reduced the sum of squares.
+    steps: usize,
     reduced: Reduced,
     scaling: Vec<f64>,
     lambda: f64,
@@ -124,6 +138,9 @@ impl<'a> State<'a> {
         let cost = sum_of_squares(&residuals);
         let mut state = Self {
             reduced: reduce(&matrix, &residuals),
+            matrix,
+            updates: 0,
+            steps: 0,
             cost,
             cost_at_start: cost,
             scaling: vec![0.0; free.len()],
@@ -162,15 +179,28 @@ impl<'a> State<'a> {
             if self.cost == 0.0 {
                 return Ok(StopReason::Exact);
             }
-            if self.at_right_angles() {
-                return Ok(StopReason::Gradient);
-            }
             if self.evaluations >= self.options.most_evaluations {
                 return Ok(StopReason::Evaluations);
             }
-            match self.advance()? {
+            let progress = match self.at_right_angles() {
+                true => Progress::Ended(StopReason::Gradient),
+                false => self.advance()?,
+            };
+            match progress {
+                Progress::Moved => {}
+                Progress::Ended(StopReason::Evaluations) => return Ok(StopReason::Evaluations),
+                // What the updated derivatives say is tried again with new ones.
+                Progress::Ended(_) | Progress::Refused if self.updates > 0 => {
+                    if !self.renew()? {
+                        return Ok(StopReason::Evaluations);
+                    }
+                }
                 Progress::Ended(reason) => return Ok(reason),
-                Progress::Moved | Progress::Refused => {}
+                Progress::Refused => {
+                    if let Some(reason) = self.damp() {
+                        return Ok(reason);
+                    }
+                }
             }
         }
     }
@@ -203,7 +233,7 @@ impl<'a> State<'a> {
     fn advance(&mut self) -> Result<Progress, FitError> {
         let room = self.room();
         let Some(step) = step(&self.reduced, &self.scaling, self.lambda, &room) else {
-            return Ok(self.refuse());
+            return Ok(Progress::Refused);
         };
         let after = &self.reduced.c + &self.reduced.r * &step;
         let predicted = self.reduced.c.norm_squared() - after.norm_squared();
@@ -215,12 +245,14 @@ impl<'a> State<'a> {
             let size = self.values[*index].abs().max(1e-3 * parameter.scale);
             moved = moved.max((trial[*index] - self.values[*index]).abs() / size);
         }
+        let made = self.how.free.iter().map(|i| trial[*i] - self.values[*i]);
+        let made = DVector::from_iterator(step.len(), made);
         if moved == 0.0 {
             return Ok(Progress::Ended(StopReason::NoProgress));
         }
         self.evaluations += 1;
         let Ok(residuals) = self.evaluated.residuals(&trial) else {
-            return Ok(self.refuse());
+            return Ok(Progress::Refused);
         };
         let cost = sum_of_squares(&residuals);
         let gain = self.cost - cost;
@@ -230,44 +262,88 @@ impl<'a> State<'a> {
             return Ok(if level {
                 Progress::Ended(StopReason::Reduction)
             } else {
-                self.refuse()
+                Progress::Refused
             });
         }
         let small_gain = gain <= tolerance * self.cost && predicted <= tolerance * self.cost;
+        let before = std::mem::replace(&mut self.residuals, residuals);
         self.values = trial;
-        self.residuals = residuals;
         self.cost = cost;
-        // The last derivatives serve for the covariance: the step to here was small, or the fit is unfinished.
-        let is_last = self.evaluations + self.per_jacobian >= self.options.most_evaluations;
-        match (small_gain, moved <= tolerance, is_last) {
-            (true, _, _) => Ok(Progress::Ended(StopReason::Reduction)),
-            (_, true, _) => Ok(Progress::Ended(StopReason::Step)),
-            (_, _, true) => Ok(Progress::Ended(StopReason::Evaluations)),
-            _ => self.go_on(gain / predicted).map(|()| Progress::Moved),
+        match (small_gain, moved <= tolerance) {
+            (true, _) => Ok(Progress::Ended(StopReason::Reduction)),
+            (_, true) => Ok(Progress::Ended(StopReason::Step)),
+            _ => self.go_on(gain / predicted, &made, &before),
         }
     }
 
     /// Increases the damping after a step that did not reduce the sum of squares.
-    fn refuse(&mut self) -> Progress {
+    fn damp(&mut self) -> Option<StopReason> {
         self.lambda = self.lambda.max(1e-15) * self.rise;
         self.rise *= 2.0;
-        if self.lambda > MOST_DAMPING {
-            Progress::Ended(StopReason::NoProgress)
-        } else {
-            Progress::Refused
-        }
+        (self.lambda > MOST_DAMPING).then_some(StopReason::NoProgress)
     }
 
     /// Goes on from a step; the better its gain was predicted, the lower the damping becomes.
-    fn go_on(&mut self, ratio: f64) -> Result<(), FitError> {
+    fn go_on(
+        &mut self,
+        ratio: f64,
+        step: &DVector<f64>,
+        before: &[f64],
+    ) -> Result<Progress, FitError> {
+        self.lambda *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0);
+        self.rise = 2.0;
+        self.steps += 1;
+        if self.steps >= self.options.most_steps {
+            return Ok(Progress::Ended(StopReason::Evaluations));
+        }
+        if self.updates < self.options.most_updates && ratio >= WELL_PREDICTED {
+            self.update(step, before);
+            return Ok(Progress::Moved);
+        }
+        Ok(match self.renew()? {
+            true => Progress::Moved,
+            false => Progress::Ended(StopReason::Evaluations),
+        })
+    }
+
+    /// Updates the derivatives so that they predict the residuals of a step: the smallest change of the scaled matrix,
+    /// `J ← J + (Δr − J s)(D²s)ᵀ/(sᵀD²s)`.
+    fn update(&mut self, step: &DVector<f64>, before: &[f64]) {
+        let mut off = -(&self.matrix * step);
+        let changes = self
+            .residuals
+            .iter()
+            .zip(before)
+            .map(|(after, before)| after - before);
+        off.iter_mut()
+            .zip(changes)
+            .for_each(|(off, change)| *off += change);
+        let scaled = DVector::from_iterator(
+            step.len(),
+            step.iter().zip(&self.scaling).map(|(s, d)| s * d * d),
+        );
+        let size = scaled.dot(step);
+        if size > 0.0 {
+            self.matrix.ger(1.0 / size, &off, &scaled, 1.0);
+        }
+        self.updates += 1;
+        self.reduced = reduce(&self.matrix, &self.residuals);
+    }
+
+    /// Takes the derivatives anew, if the remaining evaluations allow a step after them. The last ones serve for the
+    /// covariance: the step from there was small, or the fit is unfinished.
+    fn renew(&mut self) -> Result<bool, FitError> {
+        if self.evaluations + self.per_jacobian >= self.options.most_evaluations {
+            return Ok(false);
+        }
         let (matrix, count) = jacobian(&self.evaluated, &self.how, &self.values, &self.residuals)?;
         self.evaluations += count;
         self.per_jacobian = count;
         self.reduced = reduce(&matrix, &self.residuals);
-        self.lambda *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0);
-        self.rise = 2.0;
+        self.matrix = matrix;
+        self.updates = 0;
         self.rescale();
-        Ok(())
+        Ok(true)
     }
 
     fn finish(self, stop: StopReason) -> Result<Fit, FitError> {
