@@ -22,6 +22,10 @@ const MOST_EFFECTS: usize = 5;
 /// residual.
 const WAYS: usize = 2;
 
+/// Excess error power of the start of the next path, relative to that of the present one, below which it is followed
+/// instead.
+const BEHIND: f64 = 0.5;
+
 /// Excess error power of a guard model, relative to that of the best effect, below which the search ends.
 const FAR_LESS: f64 = 0.1;
 
@@ -56,7 +60,7 @@ impl SearchState {
         let starts = self.starts(&base, &round, workers);
         drop((base, round));
         let mut best: Option<Way> = None;
-        for start in starts.iter().take(WAYS) {
+        for (k, start) in starts.iter().take(WAYS).enumerate() {
             let beats = |best: &Way| {
                 let is_open = remains(&best.after, &best.tests, self.noise_floor);
                 is_open || start.criterion() < best.after.criterion()
@@ -64,7 +68,8 @@ impl SearchState {
             if !best.as_ref().is_none_or(beats) {
                 continue;
             }
-            let way = self.follow(start, coarse, workers);
+            let other = starts[k + 1..].first().filter(|_| k + 1 < WAYS);
+            let way = self.follow((start, other), coarse, workers);
             let criterion = way.after.criterion();
             if best
                 .as_ref()
@@ -162,12 +167,26 @@ impl SearchState {
         starts
     }
 
-    /// Follows a search path from its start to further effects.
-    fn follow(&mut self, start: &ScoredModel, coarse: usize, workers: Workers) -> Way {
+    /// Follows a search path from its start to further effects, unless the start of the next path explains far more with
+    /// no more effects.
+    fn follow(
+        &mut self,
+        (start, other): (&ScoredModel, Option<&ScoredModel>),
+        coarse: usize,
+        workers: Workers,
+    ) -> Way {
         let rounds = self.rounds.clone();
         self.path.clear();
         self.take(start, coarse);
-        while self.has_room() && self.add_another(coarse, workers) {}
+        let noise_rms = noise_rms(self.noise_floor);
+        let is_behind = |after: &ScoredModel| {
+            let far_more = |other: &ScoredModel| {
+                other.effect_names().len() <= after.effect_names().len()
+                    && other.excess_power(noise_rms) < BEHIND * after.excess_power(noise_rms)
+            };
+            other.is_some_and(far_more)
+        };
+        while self.has_room() && !is_behind(&self.after) && self.add_another(coarse, workers) {}
         Way {
             after: self.after.clone(),
             tests: self.tests.clone(),
