@@ -447,3 +447,40 @@ fn forward_differences_reach_the_same_values() {
         }
     }
 }
+
+/// The values, their uncertainties and the sums of squares are those of new derivatives, for fewer evaluations.
+#[test]
+fn updated_derivatives_reach_the_same_minimum_for_less() {
+    let updates = Options {
+        most_updates: 3,
+        ..Options::default()
+    };
+    let mut evaluations = [0, 0];
+    for problem in PROBLEMS {
+        let start = problem.starts[1];
+        let found = [&Options::default(), &updates].map(|options| fit(problem, start, options));
+        check(problem, 1, &found[1]);
+        for (all, fit) in evaluations.iter_mut().zip(&found) {
+            *all += fit.evaluations;
+        }
+    }
+    let [new, updated] = evaluations;
+    assert!(
+        updated < new,
+        "{updated} evaluations, {new} without updates"
+    );
+}
+
+#[test]
+fn a_fit_ends_after_so_many_steps() {
+    let problem = &PROBLEMS[0];
+    let two = Options {
+        most_steps: 2,
+        ..Options::default()
+    };
+    let found = fit(problem, problem.starts[0], &two);
+    assert!(!found.stop.converged(), "{:?}", found.stop);
+    let all = fit(problem, problem.starts[0], &Options::default());
+    assert!(found.evaluations < all.evaluations);
+    assert!(found.sum_of_squares > all.sum_of_squares);
+}
