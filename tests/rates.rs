@@ -192,6 +192,9 @@ fn a_doubtful_rate_above_a_table_is_an_assumption() {
         ("ADC sample rate: 10 kHz\nStorage rate: 2 kHz", true),
         ("Sample rate: 10 kHz\nDecimation: 5", true),
         ("Sample rate: 2 kHz\nDecimation: 1", false),
+        ("Sample rate,12,500", true),
+        ("Sample rate,12,500 Hz", false),
+        ("Sample rate,500,500", false),
     ] {
         folder.write("in.csv", format!("{header}\nbridge [V]\n{rows}"));
         let report = folder.json(&["inspect", "in.csv", "--json"]);

@@ -32,6 +32,15 @@ impl Sources<'_> {
         if keys::topic(words) == Some(Topic::Rate) && keys::is_vague(words) {
             return Some(format!("{taken}, but may be about the signal"));
         }
+        let mut split = self.entries.iter().filter(|e| e.is_number_split);
+        if let Some(entry) = split.find(|entry| entry.key == words) {
+            return Some(format!(
+                "{taken}, {} Hz, but \"{}\" in line {} may be one number",
+                short(hz),
+                entry.values.join(","),
+                entry.line
+            ));
+        }
         let clear = self.entries.iter().filter(|e| !keys::is_vague(&e.key));
         let mut rates = clear.filter_map(|e| Some((e, keys::rate_hz(e, None, self.decimal)?)));
         if let Some((entry, other)) = rates.clone().find(|(_, r)| (r - hz).abs() > SAME * hz) {

@@ -145,6 +145,7 @@ pub(super) fn fill_from_list(fields: &mut [Field], rows: &[Row]) -> Vec<Entry> {
                     line: row.line,
                     key: label.clone(),
                     values: vec![cell.clone()],
+                    is_number_split: false,
                 }),
                 _ => {}
             }

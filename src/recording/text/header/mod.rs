@@ -127,6 +127,7 @@ fn entries_below_keys(head: &Head, rows: &[Row]) -> Vec<Entry> {
                 line: head.number(pair[0].line),
                 key: key.to_owned(),
                 values: pair[1].cells.clone(),
+                is_number_split: false,
             })
         })
         .collect()

@@ -1,5 +1,6 @@
 //! Keys and values in the lines above a table: rate, start, date, number of samples.
 
+mod commas;
 mod values;
 mod words;
 
@@ -16,6 +17,8 @@ pub struct Entry {
     pub key: String,
     /// Cells after it, including empty ones.
     pub values: Vec<String>,
+    /// Whether the comma between the first two may be a mark within one number.
+    pub is_number_split: bool,
 }
 
 /// Topic of a key.
@@ -87,7 +90,7 @@ pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
     if let Some(entry) = bare_rate(line, text, dialect.decimal) {
         return vec![entry];
     }
-    let cells = split(text, dialect);
+    let (cells, mark) = split(text, dialect);
     // `CH1V,CH2V,t0 =-5e-05, tInc = 1e-09,`: separate cells.
     let assignments: Vec<Entry> = cells
         .iter()
@@ -112,7 +115,12 @@ pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
     }
     match cells.split_first() {
         Some((key, values)) if values.iter().any(|value| !value.is_empty()) => {
-            entry(line, key, values.to_vec()).into_iter().collect()
+            let entry = entry(line, key, values.to_vec());
+            let entry = entry.map(|entry| match mark {
+                Some(b',') => commas::joined(entry),
+                _ => entry,
+            });
+            entry.into_iter().collect()
         }
         _ => one_cell(line, text).into_iter().collect(),
     }
@@ -194,11 +202,12 @@ fn entry(line: usize, key: &str, values: Vec<String>) -> Option<Entry> {
                     .to_owned()
             })
             .collect(),
+        is_number_split: false,
     })
 }
 
-/// Cells of a line above a table, whose separator may differ from that of the table.
-fn split(text: &str, dialect: Dialect) -> Vec<String> {
+/// Cells of a line above a table, whose separator may differ from that of the table, and that separator.
+fn split(text: &str, dialect: Dialect) -> (Vec<String>, Option<u8>) {
     let table = match dialect.delimiter {
         Delimiter::Byte(byte) => Some(byte),
         Delimiter::Spaces | Delimiter::None => None,
@@ -209,14 +218,14 @@ fn split(text: &str, dialect: Dialect) -> Vec<String> {
             || table != Some(mark) && is_within_number(text, mark);
         if text.contains(char::from(mark)) && !is_decimal {
             let delimiter = Delimiter::Byte(mark);
-            return Dialect {
+            let dialect = Dialect {
                 delimiter,
                 ..dialect
-            }
-            .cells(text);
+            };
+            return (dialect.cells(text), Some(mark));
         }
     }
-    vec![text.to_owned()]
+    (vec![text.to_owned()], None)
 }
 
 /// Whether the first of these marks is in a number behind a word: `Abtastintervall 0,2 ms`.

@@ -32,6 +32,14 @@ fn rates_and_intervals() {
         ("0.5 msec/sample", 2000.0),
         ("2000 samples/s", 2000.0),
         ("20 sec/sample", 0.05),
+        ("Sample Rate,10,000 Hz", 1e4),
+        ("Sample Rate,1,000,000.0 Hz", 1e6),
+        ("Sample Rate,10,000,Hz", 1e4),
+        ("Fs,10,000", 1e4),
+        ("Fs,12,500 Hz", 12_500.0),
+        ("Sampling Frequency [Hz],10 000", 1e4),
+        ("Sample Rate,10,0 kHz", 1e4),
+        ("Sample Interval,0,1 ms", 1e4),
     ] {
         let found = hz(text).expect(text);
         assert!((found / value - 1.0).abs() < 1e-12, "{text}: {found}");

@@ -6,7 +6,7 @@ use crate::recording::text::clock::Clock;
 use crate::recording::text::units;
 use crate::recording::text::vocabulary::meaning;
 
-/// A number with a unit: `1.00E+09 Sa/s`, `20ms`, `1,000 Hz`.
+/// A number with a unit: `1.00E+09 Sa/s`, `20ms`, `1,000 Hz`, `10 000 Hz`.
 #[must_use]
 pub fn quantity(text: &str, decimal: u8) -> Option<(f64, String)> {
     let text = text.trim().trim_matches('"').trim();
@@ -16,7 +16,8 @@ pub fn quantity(text: &str, decimal: u8) -> Option<(f64, String)> {
             let is_exponent = matches!(c, 'e' | 'E')
                 && text[place + 1..]
                     .starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+');
-            !(c.is_ascii_digit() || matches!(c, '.' | ',' | '-' | '+' | '\'') || is_exponent)
+            let is_mark = matches!(c, '.' | ',' | '-' | '+' | '\'');
+            !(c.is_ascii_digit() || is_mark || is_exponent || is_between_thousands(text, *place))
         })
         .map_or(text.len(), |(place, _)| place);
     let number = text[..end].trim();
@@ -28,6 +29,14 @@ pub fn quantity(text: &str, decimal: u8) -> Option<(f64, String)> {
             _ => None,
         })?;
     Some((value, text[end..].trim().to_owned()))
+}
+
+/// Whether the character at a place is a space that separates thousands: between a digit and three more.
+fn is_between_thousands(text: &str, place: usize) -> bool {
+    let mut behind = text[place..].chars();
+    let is_space = matches!(behind.next(), Some(' ' | '\u{a0}' | '\u{202f}'));
+    let group = behind.take_while(char::is_ascii_digit).count();
+    is_space && group == 3 && text[..place].ends_with(|c: char| c.is_ascii_digit())
 }
 
 /// Rate in Hz from a rate or an interval, depending on the unit; `default_unit` if there is none.

@@ -128,6 +128,7 @@ fn entries(head: &Head, dialect: Dialect, place: usize) -> Vec<Entry> {
                 line: head.number(line),
                 key: key.clone(),
                 values: cells.get(place + 1..(place + 3).min(cells.len()))?.to_vec(),
+                is_number_split: false,
             })
         })
         .collect()
