@@ -1,5 +1,7 @@
 //! Format of cells and numbers, and splitting of a line into cells.
 
+use std::cell::RefCell;
+
 pub use crate::io::Delimiter;
 use crate::io::DialectOverride;
 
@@ -48,18 +50,39 @@ impl Dialect {
     }
 }
 
-/// Cells of a line with quotes, parsed by the `csv` crate.
+thread_local! {
+    /// Parsers of quoted cells by delimiter. Making one takes as long as parsing a hundred lines.
+    static PARSERS: RefCell<Vec<(u8, csv_core::Reader)>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Cells of a line with quotes.
 fn quoted_cells(line: &str, delimiter: u8) -> Vec<String> {
-    let mut reader = csv::ReaderBuilder::new()
-        .delimiter(delimiter)
-        .has_headers(false)
-        .flexible(true)
-        .from_reader(line.as_bytes());
-    let mut record = csv::StringRecord::new();
-    match reader.read_record(&mut record) {
-        Ok(true) => record.iter().map(|cell| cell.trim().to_owned()).collect(),
-        _ => Vec::new(),
+    PARSERS.with_borrow_mut(|parsers| {
+        let made = parsers.iter().position(|(mark, _)| *mark == delimiter);
+        let place = made.unwrap_or_else(|| {
+            let parser = csv_core::ReaderBuilder::new().delimiter(delimiter).build();
+            parsers.push((delimiter, parser));
+            parsers.len() - 1
+        });
+        cells_by(&mut parsers[place].1, line)
+    })
+}
+
+fn cells_by(parser: &mut csv_core::Reader, line: &str) -> Vec<String> {
+    parser.reset();
+    let (mut text, mut ends) = (vec![0; line.len()], vec![0; line.len() + 1]);
+    let (result, _, written, mut count) = parser.read_record(line.as_bytes(), &mut text, &mut ends);
+    if result == csv_core::ReadRecordResult::InputEmpty {
+        // The end of the line ends the last cell.
+        let (_, _, _, last) = parser.read_record(&[], &mut text[written..], &mut ends[count..]);
+        count += last;
     }
+    let starts = std::iter::once(0).chain(ends.iter().copied());
+    let cells = starts
+        .zip(&ends[..count])
+        .map(|(from, to)| &text[from..*to]);
+    let cells = cells.map(|cell| String::from_utf8_lossy(cell).trim().to_owned());
+    cells.collect()
 }
 
 /// Whether a line is empty, a comment, or contains only separators.
