@@ -887,3 +887,40 @@ fn a_record_that_was_interpolated_before_has_no_further_modes() {
         "{report}"
     );
 }
+
+/// Steps of the torque ring at 180 Hz, and two orders of a motor are as strong as they; the declared resonance is another
+/// one, or the orders are beside it.
+#[test]
+fn strong_orders_hide_no_resonance() {
+    let folder = Folder::new();
+    for size in [0.03, 0.3, 3.0] {
+        for motor_hz in [21.7, 29.0] {
+            let mut noise = crate::noise::Noise(11);
+            let mut respond = resonator(5000.0);
+            let torque = |t: f64| {
+                let order = |n: f64| size * (TAU * n * motor_hz * t + n).cos();
+                let steps = [0.3, 0.75, 1.3, 1.8, 2.45];
+                let passed = steps.iter().filter(|at| t > **at).count();
+                2.0 + 0.3 * (passed % 2) as f64 + order(1.0) + order(6.0)
+            };
+            let sample = |i: usize| respond(torque(i as f64 / 5000.0)) + 2e-3 * noise.normal();
+            let motion: Vec<f64> = (0..15_000).map(sample).collect();
+            folder.write("in.csv", sampled("T [N m]", 5000.0, 15_000, |i| motion[i]));
+            for (hz, ratio, said) in [
+                ("162 Hz", "0.02", Some("resonance-elsewhere")),
+                ("200 Hz", "0.02", Some("resonance-elsewhere")),
+                ("180 Hz", "0.2", Some("damping-differs")),
+                ("180 Hz", "0.02", None),
+            ] {
+                let stand = stand("").replace("60 Hz", hz);
+                let stand = stand.replace("ratio = 0.02", &format!("ratio = {ratio}"));
+                folder.write("stand.toml", stand);
+                let report = folder.json(&[&COMPENSATE[..], &["--json", "--force"]].concat());
+                let codes = codes(&report);
+                let mut both = ["resonance-elsewhere", "damping-differs"].into_iter();
+                let found = both.find(|code| codes.contains(code));
+                assert_eq!(found, said, "{size} N m, {motor_hz} Hz: {hz} {ratio}");
+            }
+        }
+    }
+}

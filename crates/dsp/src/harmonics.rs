@@ -164,6 +164,19 @@ pub fn fit(
     })
 }
 
+/// A record without its mean and its best-fitting sines of these frequencies in Hz.
+///
+/// # Errors
+/// As [`fit`].
+pub fn without(
+    samples: &[f64],
+    sample_rate_hz: f64,
+    frequencies_hz: &[f64],
+) -> Result<Vec<f64>, Error> {
+    let fit = SineFit::solve(samples, samples.len(), sample_rate_hz, 1.0, frequencies_hz)?;
+    Ok(fit.residual(0, samples))
+}
+
 /// The linear fit about the middle of a record at given frequencies.
 struct SineFit {
     /// Angular steps `2πf/f_s`, rad per sample.

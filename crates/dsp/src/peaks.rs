@@ -3,6 +3,8 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use crate::harmonics::without;
+
 /// A peak of a power spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
@@ -148,6 +150,74 @@ pub fn lines(samples: &[f64], share: f64) -> Vec<Line> {
         }
     }
     all
+}
+
+/// Bins on either side of a steady line that its window occupies, and number of bins beyond them that it must exceed.
+const LOBE: f64 = 4.0;
+const BESIDE: f64 = 16.0;
+/// Minimum power of a steady line relative to the highest of those bins.
+const PROMINENCE: f64 = 30.0;
+/// Maximum number of steady lines, the strongest ones, and number of times that they are searched for: the first fit
+/// leaves the error of its frequencies.
+const MOST_STEADY: usize = 60;
+const TIMES: usize = 3;
+
+/// A record without the lines that are steady over all of it, such as the orders of a shaft at constant speed. `None` if
+/// it has none. What decays within it is wider than its resolution and is kept.
+///
+/// ```
+/// use torqcomp_dsp::peaks::without_steady;
+/// let hum = |i: i32| (0.5 * f64::from(i)).sin();
+/// let ring = |i: i32| (-0.01 * f64::from(i % 4000)).exp() * (0.7 * f64::from(i % 4000)).sin();
+/// let record: Vec<f64> = (0..20_000).map(|i| hum(i) + ring(i)).collect();
+/// let left = without_steady(&record, 1000.0).unwrap();
+/// let off = (0..20_000).map(|i| (left[i] - ring(i as i32)).abs()).fold(0.0, f64::max);
+/// assert!(off < 0.03, "{off}");
+/// assert_eq!(without_steady(&left, 1000.0), None);
+/// ```
+#[must_use]
+pub fn without_steady(samples: &[f64], rate_hz: f64) -> Option<Vec<f64>> {
+    let mut left = None;
+    for _ in 0..TIMES {
+        let before = left.as_deref().unwrap_or(looked_at(samples));
+        let found = steady_lines(before, rate_hz);
+        if found.is_empty() {
+            break;
+        }
+        left = Some(without(before, rate_hz, &found).ok()?);
+    }
+    left
+}
+
+/// Frequencies in Hz of the steady lines of a record.
+fn steady_lines(samples: &[f64], rate_hz: f64) -> Vec<f64> {
+    let (power, size) = power(&tapered(samples));
+    let bin = size as f64 / samples.len() as f64;
+    let [lobe, beside] = [LOBE, LOBE + BESIDE].map(|bins| (bins * bin).ceil() as usize);
+    let is_line = |k: &usize| {
+        let top = power[*k];
+        let sides = [k - beside..k - lobe, k + lobe + 1..k + beside + 1];
+        let is_above =
+            |range: Range<usize>, times: f64| power[range].iter().all(|p| times * p <= top);
+        is_above(k - lobe..k + lobe + 1, 1.0) && sides.into_iter().all(|s| is_above(s, PROMINENCE))
+    };
+    let last = power.len().saturating_sub(beside + 1);
+    let mut lines: Vec<usize> = (beside..last).filter(is_line).collect();
+    lines.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
+    lines.truncate(MOST_STEADY);
+    let step_hz = rate_hz / size as f64;
+    // The vertex of the parabola through the logarithms.
+    let place = |k: usize| {
+        let [before, at, after] = [k - 1, k, k + 1].map(|k| power[k].max(f64::MIN_POSITIVE).ln());
+        let curve = before - 2.0 * at + after;
+        k as f64
+            + if curve < 0.0 {
+                0.5 * (before - after) / curve
+            } else {
+                0.0
+            }
+    };
+    lines.into_iter().map(|k| step_hz * place(k)).collect()
 }
 
 /// Number of samples over which the shortest-lived line is visible.

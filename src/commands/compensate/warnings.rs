@@ -1,6 +1,9 @@
 //! Warnings about a compensated record.
 
+use std::cell::LazyCell;
+
 use torqcomp_dsp::noise::RecordNoise;
+use torqcomp_dsp::peaks::without_steady;
 use torqcomp_dsp::quality::resonance::{dominant_resonance, other_damping, other_resonance};
 use torqcomp_dsp::quality::ringing::ringing_elsewhere;
 use torqcomp_model::Mode;
@@ -37,7 +40,10 @@ pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Tr
     );
     report.looked_at = seen.excerpt.len();
     more.extend(of_quality(report, seen));
-    more.extend(of_resonance(report, seen).or_else(|| of_damping(report, seen)));
+    // The orders of a machine hide what rings between its steps.
+    let steady = LazyCell::new(|| without_steady(&seen.excerpt, report.rate_hz));
+    let rest = || steady.as_deref();
+    more.extend(of_resonance(report, seen, &rest).or_else(|| of_damping(report, seen, &rest)));
     let levels = &report.levels;
     more.extend(levels.warnings(&seen.excerpt, report.scale, &report.unit));
     let peak = report.result.peak();
@@ -111,11 +117,19 @@ pub(super) fn modes(stand: &Stand) -> Vec<(f64, f64)> {
 }
 
 /// A warning if the record rings elsewhere than at the declared natural frequency.
-fn of_resonance(report: &CompensateReport, seen: &Seen) -> Option<Warning> {
-    let (samples, rate_hz, modes) = (&seen.excerpt, report.rate_hz, &report.modes);
-    let found = other_resonance(samples, rate_hz, modes)
-        .or_else(|| ringing_elsewhere(samples, rate_hz, modes))
-        .or_else(|| dominant_resonance(samples, rate_hz, modes))?;
+fn of_resonance<'a>(
+    report: &CompensateReport,
+    seen: &Seen,
+    rest: &dyn Fn() -> Option<&'a [f64]>,
+) -> Option<Warning> {
+    let (rate_hz, modes) = (report.rate_hz, &report.modes);
+    let rings = |samples: &[f64]| {
+        other_resonance(samples, rate_hz, modes)
+            .or_else(|| ringing_elsewhere(samples, rate_hz, modes))
+    };
+    let found = rings(&seen.excerpt)
+        .or_else(|| dominant_resonance(&seen.excerpt, rate_hz, modes))
+        .or_else(|| rest().and_then(rings))?;
     let declared_hz = report.modes[0].0;
     Some(Warning::new(
         "resonance-elsewhere",
@@ -132,11 +146,16 @@ fn of_resonance(report: &CompensateReport, seen: &Seen) -> Option<Warning> {
 }
 
 /// A warning if the record rings at the declared natural frequency with another damping.
-fn of_damping(report: &CompensateReport, seen: &Seen) -> Option<Warning> {
+fn of_damping<'a>(
+    report: &CompensateReport,
+    seen: &Seen,
+    rest: &dyn Fn() -> Option<&'a [f64]>,
+) -> Option<Warning> {
     let &[declared] = report.modes.as_slice() else {
         return None;
     };
-    let found = other_damping(&seen.excerpt, report.rate_hz, declared)?;
+    let found = |samples: &[f64]| other_damping(samples, report.rate_hz, declared);
+    let found = found(&seen.excerpt).or_else(|| rest().and_then(found))?;
     Some(Warning::new(
         "damping-differs",
         format!(
