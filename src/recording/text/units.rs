@@ -86,7 +86,10 @@ pub fn heading(text: &str) -> Heading {
     // "Zeit" t / s
     let unquoted = text.replace('"', "");
     let text = unquoted.trim();
-    if let (name, Some(unit)) = split(text) {
+    // In magnitude_V/(N m), the bracket is a part of the unit.
+    if let (name, Some(unit)) = split(text)
+        && !name.ends_with('/')
+    {
         return Heading::new(name.to_owned(), Some(unit), None);
     }
     if let Some((name, inside)) = bracket(text) {
@@ -148,8 +151,8 @@ pub fn heading(text: &str) -> Heading {
 /// Words between a name and its unit.
 const BEFORE_UNITS: [&str; 3] = [" in ", " en ", " em "];
 
-/// Name and unit of a heading that ends in a ratio of voltages or lengths, or in a speed or an acceleration, whose
-/// slash does not separate a name from a unit: `bridge mV/V`, `eps_µm/m`, `vel_mm/s`.
+/// Name and unit of a heading that ends in a ratio of voltages or lengths, in a voltage per load, or in a speed or an
+/// acceleration, whose slash does not separate a name from a unit: `bridge mV/V`, `eps_µm/m`, `H_V/Nm`, `vel_mm/s`.
 fn ratio(text: &str) -> Option<(&str, NamedUnit)> {
     let above = text.rfind('/')?;
     let start = text[..above].trim_end().rfind([' ', '_', ',', ';', ':'])?;
@@ -157,18 +160,31 @@ fn ratio(text: &str) -> Option<(&str, NamedUnit)> {
     let of_motion = ["m/s", "m/s^2", "rad/s", "rad/s^2"].map(Unit::parse);
     let mut of_motion = of_motion.iter().flatten().map(Unit::dimension);
     let is_motion = of_motion.any(|dimension| dimension == unit.unit.dimension());
-    // n_1/min is a speed, but U_1/mV a voltage.
+    let name = text[..start].trim_end_matches([' ', '_', ',', ';', ':']);
+    // n_1/min is a speed, but U_1/mV a voltage and t_1/s a time.
     let is_counted = text[start + 1..].starts_with(|c: char| c.is_ascii_digit());
+    let is_rate = is_speed(&text[start + 1..]) && !is_time_name(name);
     let is_ratio = matches!(
         unit.unit.ratio_of(),
         Some(RatioOf::Voltages | RatioOf::Lengths)
-    ) || is_motion && (!is_counted || is_speed(&text[start + 1..]));
-    let name = text[..start].trim_end_matches([' ', '_', ',', ';', ':']);
+    ) || is_motion && !is_counted
+        || is_rate
+        || is_voltage_per_load(name, &text[start + 1..above], &text[above + 1..]);
     let mut words = BEFORE_UNITS.iter().map(|word| word.trim_end());
     let name = words
         .find_map(|word| name.strip_suffix(word))
         .unwrap_or(name);
     (is_ratio && !name.is_empty() && !name.ends_with('/')).then(|| (name.trim(), unit))
+}
+
+/// Whether a name is followed by a voltage per force or torque; but `F_V/N` is a force named F_V.
+fn is_voltage_per_load(name: &str, above: &str, below: &str) -> bool {
+    let is = |text: &str, same: &[&str]| {
+        let mut same = same.iter().filter_map(|unit| Unit::parse(unit).ok());
+        let unit = read(text);
+        unit.is_some_and(|unit| same.any(|same| same.dimension() == unit.unit.dimension()))
+    };
+    !matches!(name, "F" | "M" | "T") && is(above, &["V"]) && is(below, &["N", "N m"])
 }
 
 /// Whether a unit can follow a text: not after a number (`lowpass 100 Hz`, `M/10^-3 Nm`) nor a word that requires more
@@ -227,6 +243,9 @@ fn bracket(text: &str) -> Option<(String, &str)> {
                 continue;
             };
             let inside = text[start + 1..start + length].trim();
+            if ratio(text).is_some() && text[..start].ends_with('/') {
+                continue;
+            }
             let is_at_end = start + length + 1 == text.len();
             let odd = |c: char| matches!(c, '{' | '}' | '(' | '!' | '?' | '$' | ',' | ';' | ':');
             let looks_like_unit = open == '['
@@ -240,7 +259,7 @@ fn bracket(text: &str) -> Option<(String, &str)> {
                 || inside.len() <= 8 && inside.contains(['/', '%', '°', '²', '^', 'µ']);
             if looks_like_unit && !inside.is_empty() {
                 let rest = [text[..start].trim(), text[start + length + 1..].trim()];
-                let name = rest.join(" ").trim().to_owned();
+                let name = rest.join(" ").trim().trim_end_matches('/').to_owned();
                 return Some((
                     if name.is_empty() {
                         text.to_owned()
@@ -326,6 +345,22 @@ mod tests {
             "t / s",
         ] {
             assert_eq!(scaled_time(heading), None, "{heading}");
+        }
+    }
+
+    #[test]
+    fn ratios_and_rates_after_a_name() {
+        for (text, name, unit) in [
+            ("H_V/Nm", "H", "V/Nm"),
+            ("magnitude_V/(N m)", "magnitude", "V/(N m)"),
+            ("U_mV/N", "U", "mV/N"),
+            ("F_V/N", "F_V", "N"),
+            ("M/(N m)", "M", "N m"),
+            ("speed_1/s", "speed", "1/s"),
+            ("t_1/s", "t_1", "s"),
+        ] {
+            let unit = Some(unit.to_owned());
+            assert_eq!(told(text), (name.to_owned(), unit, true), "{text}");
         }
     }
 
