@@ -148,6 +148,8 @@ impl Identification {
     }
 }
 
+/// Value relative to its standard uncertainty below which it is zero.
+const ZERO: f64 = 1e-6;
 const TERMS: &str = "Terms of the calibration standards, largest over the loads";
 
 impl FitQuality {
@@ -180,7 +182,8 @@ fn constant_rows(constants: &[NamedEstimate]) -> Vec<Vec<String>> {
             None => [short(value), "unknown".to_owned()],
         };
         let part = match constant.std() {
-            Some(std) if value != 0.0 => relative((std / value).abs(), 2),
+            // Of a value that is zero but for rounding, it would be astronomical.
+            Some(std) if value.abs() > ZERO * std => relative((std / value).abs(), 2),
             _ => String::new(),
         };
         let unit = constant.estimate.unit().to_owned();

@@ -867,3 +867,54 @@ fn one_load_off_the_line_is_said() {
     };
     assert!(warned(-0.005) && !warned(0.0));
 }
+
+/// Loads in kg, up and down in each series, read to a last digit.
+fn displayed(series: usize, digit: f64, (gain, zero): (f64, f64)) -> Vec<Point> {
+    let loads = [0.0, 0.2, 0.5, 1.0, 2.0, 1.0, 0.5, 0.2];
+    let rows = loads.iter().cycle().take(series * loads.len() + 1);
+    let read = |load: &f64| ((zero + gain * load) / digit).round() * digit;
+    let points = rows.enumerate();
+    let points = points.map(|(i, load)| point(*load, read(load), i.saturating_sub(1) / 8));
+    points.collect()
+}
+
+/// The same rounding error in every series does not average out.
+#[test]
+fn rounding_that_repeats_stays_in_the_uncertainty() {
+    let units = units();
+    let mut noise = Noise(41);
+    for series in [1, 3, 5] {
+        let mut coverage = Coverage::default();
+        for _ in 0..100 {
+            let (gain, zero) = (0.2 + 0.05 * noise.uniform(), 0.05 * noise.uniform());
+            let found = identify(&displayed(series, 1e-3, (gain, zero)), 1, &units).unwrap();
+            let codes: Vec<&str> = found.warnings.iter().map(|w| w.code).collect();
+            assert!(!codes.contains(&"row-off-line"), "{series}: {codes:?}");
+            coverage.count(of(&found, "sensitivity"), gain);
+        }
+        coverage.at_least(88, &format!("{series} series"));
+    }
+}
+
+/// Two digits after the point: deviations of up to one last digit are no second range of an amplifier.
+#[test]
+fn one_last_digit_is_no_jump_of_the_sensitivity() {
+    let mut noise = Noise(42);
+    for _ in 0..200 {
+        let truth = (0.16 + 0.08 * noise.uniform(), 0.05 * noise.uniform());
+        let found = identify(&displayed(1, 1e-2, truth), 1, &units());
+        assert!(found.is_ok(), "{truth:?}: {found:?}");
+    }
+}
+
+/// Every row of a logger shows the same digits at each load.
+#[test]
+fn constant_readings_are_steady() {
+    let loads = [0.0, 0.5, 1.0, 2.0, 1.0, 0.5, 0.0];
+    let rows = loads.iter().flat_map(|load| [*load; 200]);
+    let reading = |load: f64| (13.0 + 196.0 * load).round() / 1e3;
+    let points: Vec<Point> = rows.map(|load| point(load, reading(load), 0)).collect();
+    let found = identify(&points, 1, &units()).unwrap();
+    let codes: Vec<&str> = found.warnings.iter().map(|w| w.code).collect();
+    assert!(!codes.contains(&"unsettled-left-out"), "{codes:?}");
+}

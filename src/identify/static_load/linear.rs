@@ -4,7 +4,7 @@
 //! has that error, whatever the characteristic (lack of fit; N. R. Draper, H. Smith, Applied Regression Analysis, 3rd
 //! ed., 1998, 2.1).
 
-use super::mixed::resolution;
+use super::mixed::{last_digits, resolution};
 use super::steps::LoadSteps;
 use super::{NONE, Point, SAME, value_of};
 use crate::failure::{ErrorCode, Failure};
@@ -56,7 +56,13 @@ pub(super) fn refuse_two_ranges(points: &[Point], steps: &LoadSteps) -> Result<(
     sizes.retain(|size| *size > NONE * largest);
     sizes.sort_by(f64::total_cmp);
     sizes.dedup_by(|a, b| (*a - *b).abs() <= SAME * largest);
-    let (_, one_range) = through_zero(&loaded);
+    let (slope, one_range) = through_zero(&loaded);
+    let off = loaded
+        .iter()
+        .map(|p| (p.reading - zero - slope * p.load).abs());
+    if off.fold(0.0, f64::max) < last_digits(points) {
+        return Ok(());
+    }
     let last = sizes.len().saturating_sub(FEWEST);
     let splits = sizes.get(FEWEST..=last).unwrap_or_default().iter();
     let with_split = |from: &f64| {

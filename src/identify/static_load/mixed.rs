@@ -16,7 +16,7 @@
 //! mountings has the uncertainty of the mean of m sensitivities, with m − 1 degrees of freedom.
 //!
 //! Readings are rounded to their last digit d: however small the residual, e is at least d/√12, unless the readings
-//! have given uncertainties (JCGM 100:2008, F.2.2.1).
+//! have given uncertainties (JCGM 100:2008, F.2.2.1). Errors of rounding that repeat are added (`repeated`).
 
 use std::collections::BTreeMap;
 
@@ -24,6 +24,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use torqcomp_model::fit::FitError;
 
 use super::Point;
+use super::repeated;
 use super::solve::{Mixed, VarianceRatios};
 use super::steps::LoadSteps;
 use crate::student::student;
@@ -124,6 +125,7 @@ pub(super) fn fit(
     if let Some(std) = over_mountings(points, degree, largest, ratios) {
         found.std[1] = Some(std);
     }
+    repeated::widen(&mut found.std, &model, steps);
     Ok(LoadCurve {
         has_even_drift,
         has_hysteresis,
@@ -178,6 +180,16 @@ pub(super) fn resolution(readings: &[f64]) -> Option<f64> {
     let digits = (DIGITS.0..=DIGITS.1).rev().map(|k| 10.0_f64.powi(k));
     let shown = digits.filter(|digit| largest / digit < 0.1 * OF_DIGIT / f64::EPSILON);
     shown.into_iter().find(|digit| is_multiple(*digit))
+}
+
+/// Deviations of a reading from a line through others, in last digits, that rounding explains: half a digit of its own,
+/// and up to as much again where the line is extrapolated.
+const ROUNDED: f64 = 1.5;
+
+/// Deviation up to which a reading may be on a line through others, as all are rounded.
+pub(super) fn last_digits(points: &[Point]) -> f64 {
+    let readings: Vec<f64> = points.iter().map(|p| p.reading).collect();
+    ROUNDED * resolution(&readings).unwrap_or(0.0)
 }
 
 /// A column for each load step that is read in both directions, or for each range of the load if there are many: 1 in

@@ -7,6 +7,7 @@ mod mixed;
 mod outlier;
 mod plateaus;
 mod ramp;
+mod repeated;
 mod rows;
 mod settling;
 mod solve;
@@ -362,7 +363,7 @@ fn method(result: &mut Identification, fit: &LoadCurve, points: &[Point], unit: 
     ];
     if fit.resolution > 0.0 {
         result.method.push(format!(
-            "uncertainties come from the last digit of the readings, {} {unit}",
+            "uncertainties come from rounding: all readings are multiples of {} {unit}, taken as their last digit",
             rounded(fit.resolution, 1)
         ));
     }

@@ -1,5 +1,6 @@
 //! A large residual: of a single row that is off the line of all others, as with a mistyped load, or of all.
 
+use super::mixed::last_digits;
 use super::ramp::line;
 use super::{LoadUnits, Point, value_of};
 use crate::identify::{Identification, rms};
@@ -62,8 +63,10 @@ pub(super) fn off_line(
     let point = points[place];
     let off = (point.reading - value_of(&line, point.load)).abs();
     let largest = points.iter().fold(0.0_f64, |m, p| m.max(p.load.abs()));
-    let is_off =
-        rest < WITHOUT * all && off > FAR.0 * rest && off > FAR.1 * (line[1] * largest).abs();
+    let is_off = rest < WITHOUT * all
+        && off > FAR.0 * rest
+        && off > FAR.1 * (line[1] * largest).abs()
+        && off > last_digits(points);
     if !is_off {
         return None;
     }

@@ -114,6 +114,15 @@ impl Mixed {
         })
     }
 
+    /// Weight of each reading in each coefficient of ordinary least squares, `(XᵀX)⁻¹Xᵀ`.
+    pub fn weights(&self) -> Option<DMatrix<f64>> {
+        let design = DMatrix::from_fn(self.readings.len(), self.fixed.len(), |i, k| {
+            self.fixed[k][i]
+        });
+        let inverse = design.tr_mul(&design).cholesky()?.inverse();
+        Some(inverse * design.transpose())
+    }
+
     /// Coefficients by ordinary least squares, and their variances with errors of these variances, relative to that of
     /// a reading; `None` if the columns do not determine them. With A = (XᵀX)⁻¹Xᵀ, that of a coefficient is
     /// `Σ_i A_i² + v_w Σ_i (Σ_{k≥i} A_k)² + v_a Σ_s (Σ_{k∈s} A_k)² + v_b Σ_p (Σ_{k∈p} A_k x_k)²`.
@@ -121,11 +130,7 @@ impl Mixed {
         &self,
         [drift, zeros, sensitivities]: VarianceRatios,
     ) -> Option<(DVector<f64>, Vec<f64>)> {
-        let design = DMatrix::from_fn(self.readings.len(), self.fixed.len(), |i, k| {
-            self.fixed[k][i]
-        });
-        let inverse = design.tr_mul(&design).cholesky()?.inverse();
-        let weights = inverse * design.transpose();
+        let weights = self.weights()?;
         let values = &weights * DVector::from_column_slice(&self.readings);
         let variance = |k: usize| {
             let row: Vec<f64> = weights.row(k).iter().copied().collect();

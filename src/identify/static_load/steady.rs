@@ -5,6 +5,7 @@
 //! most, would determine the sensitivity. Such rows are left out, and the mean of the others counts as one reading.
 
 use super::Point;
+use super::mixed::last_digits;
 use super::plateaus::mean;
 use super::settling::RUN;
 use crate::identify::Identification;
@@ -52,6 +53,10 @@ impl SteadyReadings {
     /// From the runs of a data logger; `None` if they are few or short, or all rows are steady and independent.
     pub fn of(runs: &[&[Point]]) -> Option<Self> {
         if runs.len() < LOADS || runs.iter().any(|run| run.len() < ROWS) {
+            return None;
+        }
+        let digit = last_digits(&runs.concat());
+        if runs.iter().all(|run| range(run) < digit) {
             return None;
         }
         let parts: Vec<Scatter> = PARTS.iter().map(|part| Scatter::of(runs, *part)).collect();
@@ -111,6 +116,12 @@ impl SteadyReadings {
             ),
         );
     }
+}
+
+/// Range of the readings of a run.
+fn range(run: &[Point]) -> f64 {
+    let readings = run.iter().map(|p| p.reading);
+    readings.clone().fold(f64::MIN, f64::max) - readings.fold(f64::MAX, f64::min)
 }
 
 /// The rows of a load from one fraction of them to another.
