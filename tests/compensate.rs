@@ -503,3 +503,25 @@ fn a_wrong_phase_is_part_of_the_uncertainty() {
         "{stated} {relative}"
     );
 }
+
+/// A record in newtons beside a gain in volts per newton needs no gain; a gain in newtons per volt is written the wrong way
+/// round.
+#[test]
+fn a_record_of_the_applied_quantity_needs_no_gain() {
+    let folder = Folder::new();
+    for (unit, gain, said) in [
+        ("N", "0.0008 V/N", "static_gain = \"1 N/N\""),
+        ("kgf", "0.0008 V/N", "static_gain = \"1 N/N\""),
+        ("lb", "0.0008 V/N", "--unit lbf"),
+        ("V", "1250 N/V", "\"0.0008 V/N\""),
+    ] {
+        let stand = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"60 Hz\"\ndamping_ratio = 0.03\n";
+        folder.write("stand.toml", format!("{stand}static_gain = \"{gain}\"\n"));
+        folder.write(
+            "in.csv",
+            format!("time_s,x [{unit}]\n0,1\n0.001,1\n0.002,1\n"),
+        );
+        let ran = folder.run(&["compensate", "in.csv", "--stand", "stand.toml"]);
+        ran.says(1, &[said]);
+    }
+}

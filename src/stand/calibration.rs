@@ -4,6 +4,7 @@ use torqcomp_decimal::digits;
 use torqcomp_dsp::conversion::Conversion;
 use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit, UnitSystem};
 
+use super::gain_unit;
 use super::static_law::StaticLaw;
 use super::{ConstantStd, Stand, TransducerSignal, heading_scale};
 use crate::failure::{ErrorCode, Failure};
@@ -320,27 +321,6 @@ impl Stand {
         self.mechanics.as_ref()?.static_gain.as_ref()
     }
 
-    /// Failure for a static gain that is applied over recorded quantity.
-    fn inverse_gain(
-        &self,
-        channel: &str,
-        named: &NamedUnit,
-        gain: &super::StaticGain,
-        [over, under]: [&Unit; 2],
-    ) -> Failure {
-        let (of_over, of_under) = (&gain.recorded_unit, &gain.applied_unit);
-        Failure::failed(
-            ErrorCode::UnitUnsuitable,
-            format_args!(
-                "the static_gain of {} is in {of_over}/{of_under}, but \"{channel}\" is recorded in \"{}\": a static gain \
-                 is recorded over applied quantity; write the inverse, static_gain = \"{} {of_under}/{of_over}\"",
-                self.file,
-                named.text,
-                digits::text(over.factor() / (under.factor() * gain.value), 6),
-            ),
-        )
-    }
-
     fn by_static_gain(
         &self,
         channel: &str,
@@ -348,24 +328,7 @@ impl Stand {
         gain: &super::StaticGain,
         units: UnitSystem,
     ) -> Result<Calibration, Failure> {
-        let expected =
-            Unit::parse(&gain.recorded_unit).map_err(Failure::of(ErrorCode::UnitUnclear))?;
-        let is_other = expected.dimension() != named.unit.dimension();
-        let applied =
-            Unit::parse(&gain.applied_unit).map_err(Failure::of(ErrorCode::UnitUnclear))?;
-        if is_other && applied.dimension() == named.unit.dimension() {
-            return Err(self.inverse_gain(channel, named, gain, [&expected, &applied]));
-        }
-        if is_other || expected.ratio_of() != named.unit.ratio_of() {
-            return Err(Failure::failed(
-                ErrorCode::UnitUnsuitable,
-                format_args!(
-                    "the channel \"{channel}\" is in \"{}\", but the static_gain of {} expects \"{}\"; \
-                 choose another channel, or say the unit with --unit",
-                    named.text, self.file, gain.recorded_unit
-                ),
-            ));
-        }
+        gain_unit::check(&self.file, channel, named, gain)?;
         // A zero in volts belongs to a record in volts.
         let zero = self.zero_as(TransducerSignal::of(&named.unit));
         let at_rest = zero.map_or(0.0, Estimate::value);

@@ -5,6 +5,7 @@ mod drawing;
 mod effects;
 mod file;
 mod gain;
+mod gain_unit;
 mod heading_scale;
 pub(crate) mod keys;
 mod measured;
