@@ -77,6 +77,7 @@ const REASONS: [(&str, &[&str]); 5] = [
             "bridge it with --fill",
             "expected a number",
             "not a finite number",
+            "the input exceeds its range",
         ],
     ),
     (

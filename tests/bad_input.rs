@@ -151,6 +151,13 @@ fn cells() {
         &["line 1500", "1.#INF"],
     );
     refused(&with(2, "0,-inf"), &[], 1, &["line 2", "-inf"]);
+    let clipped = [
+        "line 1500",
+        "\"\u{221e}\"",
+        "exceeds its range",
+        "larger range",
+    ];
+    refused(&with(1500, "0.0749,\u{221e}"), &[], 1, &clipped);
     refused(
         &with(1500, "0.0749,12x3"),
         &[],
@@ -289,6 +296,9 @@ fn time() {
     refused(&step(5, 1e-4), &[], 1, &["line 7", "not uniform"]);
     // 2 % of a step is rejected, half a per cent is not.
     refused(&step(2000, 1e-6), &[], 1, &["line 2002", "1.02 times"]);
+    // A gap that --fill would refuse.
+    let too_long = ["too long to fill", "--range"];
+    refused(&step(2000, 2.0), &[], 1, &too_long);
     let folder = Folder::new();
     folder.write("in.csv", step(2000, 2.5e-7));
     let ran = folder.run(&["compensate", "in.csv", "--stand", "stand.toml", "-q"]);
@@ -426,6 +436,15 @@ fn wrong_usage_ends_with_2() {
     let negative = "compensate in.csv --stand stand.toml --band -5".split(' ');
     let ran = folder.run(&negative.collect::<Vec<_>>());
     ran.says(2, &["'-5'", "expected a frequency in Hz"]);
+    for (args, said) in [
+        (["--band", "1k"], "write \"1 kHz\""),
+        (["--rate", "10K"], "write \"10 kHz\""),
+        (["--fs", "5000"], "'--rate'"),
+        (["--sample-rate", "5000"], "'--rate'"),
+    ] {
+        let ran = folder.run(&[&COMPENSATE[..], &args].concat());
+        ran.says(2, &[said]);
+    }
 }
 
 #[test]

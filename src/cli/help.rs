@@ -1,7 +1,8 @@
 //! Help pages with two examples at the end, and the options that a result may depend on.
 
+use clap::builder::UnknownArgumentValueParser;
 use clap::parser::ValueSource;
-use clap::{ArgMatches, Command, CommandFactory, FromArgMatches};
+use clap::{Arg, ArgMatches, Command, CommandFactory, FromArgMatches};
 
 use super::Cli;
 use crate::file_name::ShowPath;
@@ -81,10 +82,35 @@ pub fn command() -> Command {
 /// For help, version and mistakes.
 pub(crate) fn parse() -> Result<Cli, clap::Error> {
     let command = command();
-    let matches = command.clone().try_get_matches()?;
+    let matches = with_other_names(command.clone()).try_get_matches()?;
     let mut cli = Cli::from_arg_matches(&matches)?;
     cli.options = options(&command, &matches);
     Ok(cli)
+}
+
+/// Names of other programs for options: the answer to them names ours, where the nearest in spelling is another one.
+const OTHER_NAMES: &[(&str, &[&str])] = &[(
+    "--rate",
+    &["fs", "sample-rate", "samplerate", "sampling-rate"],
+)];
+
+/// A command that answers such names.
+fn with_other_names(command: Command) -> Command {
+    if command.has_subcommands() {
+        return command.mut_subcommands(with_other_names);
+    }
+    OTHER_NAMES.iter().fold(command, |command, (own, others)| {
+        let long = own.trim_start_matches('-');
+        let has_own = command
+            .get_arguments()
+            .any(|arg| arg.get_long() == Some(long));
+        let other = Arg::new(others[0])
+            .long(others[0])
+            .aliases(others[1..].iter().copied())
+            .hide(true)
+            .value_parser(UnknownArgumentValueParser::suggest_arg(*own));
+        if has_own { command.arg(other) } else { command }
+    })
 }
 
 /// The given options that may affect a result, sorted by name.

@@ -218,13 +218,25 @@ impl ChannelChoice {
 pub(crate) fn frequency(text: &str) -> Result<f64, String> {
     let value = match text.trim().parse::<f64>() {
         Ok(value) => value,
-        Err(_) => Kind::Frequency.parse(text).map_err(|e| e.to_string())?,
+        Err(_) => Kind::Frequency
+            .parse(text)
+            .map_err(|e| without_hertz(text).unwrap_or_else(|| e.to_string()))?,
     };
     if value.is_finite() && value >= 0.0 {
         Ok(value)
     } else {
         Err("expected a frequency in Hz, such as 2400 or \"2.4 kHz\"".to_owned())
     }
+}
+
+/// What is missing from a frequency such as `10k`.
+fn without_hertz(text: &str) -> Option<String> {
+    let text = text.trim();
+    let (prefix, number) = [("k", ['k', 'K']), ("M", ['M', 'M'])]
+        .iter()
+        .find_map(|(prefix, letters)| Some((*prefix, text.strip_suffix(letters)?.trim())))?;
+    let is_number = number.parse::<f64>().is_ok();
+    is_number.then(|| format!("the unit is missing; write \"{number} {prefix}Hz\""))
 }
 
 /// A positive frequency that is plausible for a clock, so that the times of its samples are finite.

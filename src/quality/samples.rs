@@ -174,6 +174,10 @@ fn non_finite_cells(name: &str, found: &NonFinite, axis: &TimeAxis, holes: &[Hol
             HoleKind::InstrumentsMark,
             "with 9.91e37 or \u{b1}9.9e37, which instruments write for no value or over range",
         ),
+        (
+            HoleKind::OverRange,
+            "over range: the input was clipped there",
+        ),
         (HoleKind::Text, "text"),
     ];
     let counts: Vec<String> = kinds

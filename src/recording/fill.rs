@@ -75,14 +75,9 @@ impl Recording {
         let mut warning = said(&channel.name, fill, &filled.spans, |after_s| {
             channel.axis.moment(after_s).short()
         });
-        let is_mark = |hole: &&Hole| hole.what == HoleKind::InstrumentsMark;
-        let marks = holes.iter().filter(is_mark).count();
-        if let Some(warning) = warning.as_mut().filter(|_| marks > 0) {
-            warning.message += &format!(
-                "; {} read 9.91e37 or \u{b1}9.9e37, which instruments write for no value or over range",
-                plural(marks, "cell")
-            );
-        }
+        warning
+            .iter_mut()
+            .for_each(|warning| add_marks(warning, &holes));
         let absolute = |span: FilledSpan| FilledSpan {
             from_s: span.from_s + origin_s,
             to_s: span.to_s + origin_s,
@@ -91,6 +86,34 @@ impl Recording {
         channel.filled = filled.spans.into_iter().map(absolute).collect();
         self.warnings.extend(warning);
         Ok(())
+    }
+}
+
+/// What to do about a gap of so many steps.
+pub(super) fn remedy(steps: f64) -> &'static str {
+    match steps > LONGEST {
+        true => "that is too long to fill; use --range to select the part before or after it",
+        false => "use --fill linear to fill the gap, or --range to exclude it",
+    }
+}
+
+/// Adds what the cells say that were filled in.
+fn add_marks(warning: &mut Warning, holes: &[Hole]) {
+    let texts = [
+        (
+            HoleKind::InstrumentsMark,
+            "read 9.91e37 or \u{b1}9.9e37, which instruments write for no value or over range",
+        ),
+        (
+            HoleKind::OverRange,
+            "over range: the peaks of the input are lost",
+        ),
+    ];
+    for (kind, text) in texts {
+        let count = holes.iter().filter(|hole| hole.what == kind).count();
+        if count > 0 {
+            warning.message += &format!("; {} {text}", plural(count, "cell"));
+        }
     }
 }
 

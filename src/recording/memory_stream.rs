@@ -139,6 +139,7 @@ fn refuse_holes(channel: &Channel, by_stamps: bool, remedy: &str) -> Result<(), 
         HoleKind::InstrumentsMark => {
             "is 9.91e37 or \u{b1}9.9e37, which instruments write for no value or over range"
         }
+        HoleKind::OverRange => "is over range: the peaks of the input are lost",
         HoleKind::Text => "is text, expected a number",
     };
     let refused = Failure::failed(

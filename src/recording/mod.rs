@@ -157,6 +157,8 @@ pub enum HoleKind {
     NonFinite,
     /// A number that instruments use for a missing value: 9.91e37, ±9.9e37.
     InstrumentsMark,
+    /// A text that says that the input exceeded the range: `∞`, `OVLD`.
+    OverRange,
     /// Text.
     Text,
 }

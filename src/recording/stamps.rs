@@ -7,6 +7,7 @@ use super::Channel;
 use super::arrival_blocks::ArrivalBlocks;
 use super::axis::{RateFrom, TimeAxis, UNIFORM, rounding, step_of, without_rounding};
 use super::checkpoints::sharpened;
+use super::fill;
 use super::moment::Moment;
 use super::rollover::rolled_over;
 use super::shared_stamps::{refuse_shared_stamps, same_stamps};
@@ -367,9 +368,8 @@ impl StampGrid {
             );
         }
         let length = (found.after - found.before) / step;
-        let is_gap = is_gap(length, 0.0);
-        let remedy = match is_gap {
-            true => "use --fill linear to fill the gap, or --range to exclude it",
+        let remedy = match is_gap(length, 0.0) {
+            true => fill::remedy(length),
             false => "use --resample to interpolate, or --rate HZ if the stamps are wrong",
         };
         format!(

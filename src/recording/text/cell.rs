@@ -163,10 +163,12 @@ pub fn is_instruments_mark(text: &str) -> bool {
         && plain.parse().is_ok_and(number::is_instruments_mark)
 }
 
-/// `+++++++` and `-------`, as written by Graphtec for out-of-range values.
-fn is_over_range(text: &str) -> bool {
+/// Whether a cell says that the input exceeded the range of the recorder: `∞`, `OVLD`, and Graphtec's `+++++++` and
+/// `-------`.
+#[must_use]
+pub fn is_over_range(text: &str) -> bool {
     let all = |sign: u8| text.len() > 3 && text.bytes().all(|byte| byte == sign);
-    all(b'+') || all(b'-')
+    all(b'+') || all(b'-') || has("over range", &text.to_lowercase())
 }
 
 /// A number that overflows an `f64`, such as 1e999.

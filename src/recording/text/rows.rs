@@ -11,7 +11,7 @@ mod plain_row;
 use torqcomp_decimal::{Span, number};
 
 use super::blocks::TableEnd;
-use super::cell::{Cell, is_instruments_mark};
+use super::cell::{Cell, is_instruments_mark, is_over_range};
 use super::clock::Clock;
 use super::row_template::RowTemplate;
 use crate::failure::{ErrorCode, Failure};
@@ -288,6 +288,7 @@ impl Rows {
                 Ok(after.map_or(value - origin as f64, |(after, _)| after))
             }
             (_, Cell::NonFinite) if is_instruments_mark(text) => Err(HoleKind::InstrumentsMark),
+            (_, Cell::NonFinite) if is_over_range(text) => Err(HoleKind::OverRange),
             (_, Cell::NonFinite) => Err(HoleKind::NonFinite),
             _ => Err(HoleKind::Text),
         };

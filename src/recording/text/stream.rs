@@ -3,7 +3,7 @@
 use torqcomp_decimal::{Span, number};
 
 use super::axes::Role;
-use super::cell::{is_instruments_mark, is_non_finite};
+use super::cell::{is_instruments_mark, is_non_finite, is_over_range};
 use super::chunks::Chunks;
 use super::clock::unwrap_midnights;
 use super::last_line::shortened;
@@ -209,6 +209,11 @@ impl ChannelPlan {
             Some(text) if is_instruments_mark(text) => format!(
                 "column {column} (\"{name}\") reads \"{text}\", which instruments write for no value or over range; \
                  {BRIDGE}"
+            ),
+            Some(text) if is_over_range(text) => format!(
+                "column {column} (\"{name}\") reads \"{text}\", which the recorder writes where the input exceeds its \
+                 range: the peaks are lost. Record with a larger range, or exclude the part with --range; \
+                 --fill linear only draws a straight line across"
             ),
             Some(text) if is_non_finite(text) => format!(
                 "column {column} (\"{name}\") reads \"{text}\", which is not a finite number; {BRIDGE}"
