@@ -493,3 +493,19 @@ fn a_record_cut_in_its_last_line_is_used_up_to_there() {
     ran.says(3, &["unended-last-line", "line 3001"]);
     assert_eq!(folder.read("out.csv").lines().count(), 3001);
 }
+
+#[test]
+fn a_table_over_frequency_is_no_record() {
+    let folder = Folder::new();
+    for heading in ["Frequency (Hz),Magnitude (dB),Phase (deg)", "freq,Re,Im"] {
+        let rows = (1..200).map(|k| format!("{},{},{}\n", 5 * k, 0.01 * f64::from(k), -k));
+        folder.write("in.csv", format!("{heading}\n{}", rows.collect::<String>()));
+        let more = ["--channel", "2", "--unit", "N m"];
+        let said = ["looks like a frequency response", "identify response"];
+        folder
+            .run(&[&COMPENSATE[..], &more].concat())
+            .says(1, &said);
+        let report = folder.json(&["inspect", "in.csv", "--json"]).to_string();
+        assert!(report.contains(said[0]), "{heading}: {report}");
+    }
+}

@@ -10,7 +10,7 @@ use crate::print::plural;
 use crate::print::rounded as number;
 use crate::recording::{
     ArrivalBlocks, COARSE_STAMPS, Channel, FEWEST_UNLIKE, REVERSED, TimeAxis, advice_for_uneven,
-    contradicted, falls, rates_of, rolled_over, same_stamps,
+    contradicted, falls, no_stamps, rates_of, rolled_over, same_stamps,
 };
 use crate::warning::Warning;
 
@@ -146,7 +146,7 @@ fn missing(whose: &str, axis: &TimeAxis) -> Option<Warning> {
             let advice = advice_for_uneven(stamps).unwrap_or_else(|| given.to_owned());
             format!("the time stamps have no usual step; {advice}")
         }
-        None => format!("the file has neither time stamps nor a rate; {given}"),
+        None => no_stamps(axis, given),
     };
     let message = format!("{whose}: the sampling rate is unknown, because {why}");
     Some(Warning::new("missing-rate", message))

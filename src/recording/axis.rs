@@ -78,6 +78,20 @@ pub struct TimeAxis {
     /// Assumption about the axis that should be confirmed before results rely on it:
     /// `the column "Time" gives no unit; seconds were assumed`.
     pub assumed: Option<String>,
+    /// Without stamps and rate, heading of a first column that contains rising frequencies.
+    pub(crate) frequencies_in: Option<String>,
+}
+
+/// Why a record without stamps has no rate, and what to do; `given` tells how to give one.
+pub(crate) fn no_stamps(axis: &TimeAxis, given: &str) -> String {
+    match &axis.frequencies_in {
+        Some(heading) => format!(
+            "the file looks like a frequency response: \"{heading}\" contains rising frequencies. A record over time is \
+             expected; identify response takes excitation and response as recorded, or write the natural_frequency, \
+             damping_ratio and static_gain of this response into [mechanics]"
+        ),
+        None => format!("the file has neither time stamps nor a rate; {given}"),
+    }
 }
 
 /// Source of a rate.

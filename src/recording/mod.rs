@@ -45,6 +45,7 @@ pub(crate) use aligned::AlignedChannels;
 pub use all_samples::AllSamples;
 pub(crate) use arrival_blocks::ArrivalBlocks;
 pub(crate) use axis::FEWEST_UNLIKE;
+pub(crate) use axis::no_stamps;
 pub(crate) use axis::without_rounding;
 pub use axis::{REVERSED, RateFrom, TimeAxis, falls, seconds_assumed, typical_step};
 pub(crate) use block::Block;

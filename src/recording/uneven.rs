@@ -3,7 +3,7 @@
 use torqcomp_decimal::digits;
 
 use super::Channel;
-use super::axis::{REVERSED, SampleStep, falls};
+use super::axis::{REVERSED, SampleStep, falls, no_stamps};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::plural;
 
@@ -58,7 +58,7 @@ pub(super) fn without_rate(channel: &Channel) -> Failure {
             let advice = advice_for_uneven(stamps).unwrap_or_else(|| given.to_owned());
             format!("its time stamps have no usual step; {advice}")
         }
-        None => format!("the file has neither time stamps nor a rate; {given}"),
+        None => no_stamps(&channel.axis, given),
     };
     Failure::failed(
         ErrorCode::TimeUnknown,

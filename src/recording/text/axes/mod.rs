@@ -14,6 +14,7 @@ use torqcomp_dsp::quality::rounding::rounded;
 use super::header::Field;
 use super::keys::{self, Entry};
 use super::rows::{Column, ColumnKind};
+use super::vocabulary::has;
 use crate::failure::Failure;
 use crate::io::Reading;
 use crate::recording::moment::Moment;
@@ -66,6 +67,7 @@ pub struct AxisRule {
     given_hz: Option<f64>,
     start_text: Option<String>,
     assumed: Option<String>,
+    frequencies_in: Option<String>,
 }
 
 /// Data for finding the axes.
@@ -113,6 +115,7 @@ impl AxisRule {
         }
         axis.header_rate_hz = self.header.as_ref().map(|(_, hz)| *hz);
         self.prefer_header(&mut axis);
+        axis.frequencies_in.clone_from(&self.frequencies_in);
         axis.assumed = self.assumed().map(str::to_owned);
         axis.start_text.clone_from(&self.start_text);
         if axis.start_text.is_none() {
@@ -213,12 +216,28 @@ impl Sources<'_> {
                 (Some(a), Some(b)) => Some(format!("{a}; {b}")),
                 (a, b) => a.or(b).map(str::to_owned).or(of_header),
             },
+            frequencies_in: self
+                .frequencies_in()
+                .filter(|_| stamps.is_none() && header.is_none()),
             header_start_s: self.header_start(),
             given_hz: self.reading.rate_hz,
             stamps,
             header,
             start_text,
         })
+    }
+
+    /// Heading of the first of several columns if it contains the frequencies of a frequency response.
+    fn frequencies_in(&self) -> Option<String> {
+        let (field, column) = (self.fields.first()?, self.columns.first()?);
+        let is_named = has("frequencies", &field.name.to_lowercase());
+        let is_frequency = match &field.unit {
+            Some(named) => named.unit.is_hertz(),
+            None => is_named,
+        };
+        let values = &column.values;
+        let rises = values.len() > 2 && values.windows(2).all(|pair| pair[1] > pair[0]);
+        (is_frequency && rises && self.fields.len() > 1).then(|| field.heading.clone())
     }
 
     /// The header rate for a single channel.
