@@ -964,3 +964,19 @@ fn a_sweep_limited_before_the_noise_is_clipped() {
         );
     }
 }
+
+/// With one usable hit of four, the others are named.
+#[test]
+fn a_single_hit_that_is_left_names_the_others() {
+    let (force, shown) = hits(&HITS, 3e-3, COUNT);
+    let force: Vec<f64> = force.iter().map(|v| v.min(102.0)).collect();
+    let rows = force.iter().zip(&shown).enumerate();
+    let rows = rows.map(|(i, (f, v))| format!("{:.5},{f:.6},{v:.8}\n", i as f64 / RATE_HZ));
+    let rows: String = rows.collect();
+    let folder = Folder::new();
+    folder.write("in.csv", format!("time_s,hammer_N,bridge_V\n{rows}"));
+    let channels = ["--applied", "hammer", "--measured", "bridge"];
+    folder
+        .run(&[&["identify", "response", "in.csv"], &channels[..]].concat())
+        .says(1, &["its force is clipped", "the one hit that is left"]);
+}

@@ -146,7 +146,7 @@ fn evaluate(
     // The transforms of whole records take about as long as the search for the number of modes.
     let (found, whole) = std::thread::scope(|scope| {
         let whole = scope.spawn(|| whole::Whole::of(records, &set, &data));
-        let found = order::order(&set, &lines, options, &data);
+        let found = order::order(&set, &lines, options, &data, &result.warnings);
         (found, whole.join().expect("a transform does not panic"))
     });
     let (coarse, held_out) = found.map_err(|failure| match leads {

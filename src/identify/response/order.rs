@@ -8,6 +8,7 @@ use super::whole::Whole;
 use super::{Data, Effort, FinalFit, Modal, ResponseOptions, determined, shift};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::rounded;
+use crate::warning::Warning;
 
 /// Relative frequency difference below which no second mode is searched for, unless the number of modes is given: the
 /// residual of a slightly nonlinear mode is close to its line.
@@ -62,12 +63,13 @@ pub(super) fn folds(set: &Set) -> Vec<Vec<usize>> {
 }
 
 /// A coarse fit to all blocks, and the hold-out errors for 0, 1, 2, … modes, which determine their number; if that is
-/// given, only its error.
+/// given, only its error. `said` are the warnings so far.
 pub(super) fn order(
     set: &Set,
     lines: &Lines,
     options: &ResponseOptions,
     data: &Data,
+    said: &[Warning],
 ) -> Result<(Modal, Vec<f64>), Failure> {
     let folds = folds(set);
     if lines.len() > MOST_LINES {
@@ -89,10 +91,7 @@ pub(super) fn order(
         return Ok((all, errors));
     }
     if folds.len() < 2 {
-        return Err(Failure::failed(
-            ErrorCode::TooFewSamples,
-            "one block is not enough to choose the number of modes; give it, as --modes 1 for a single resonance, or record more",
-        ));
+        return Err(one_block(said));
     }
     let errors = tried(set, lines, options, &folds)?;
     // Leakage may hide a mode in blocks, but not in whole records.
@@ -105,6 +104,23 @@ pub(super) fn order(
         (best, _) => best,
     };
     Ok((grown(data, options, best)?, errors))
+}
+
+/// Failure for a single block, and for the hits that were left out before.
+fn one_block(said: &[Warning]) -> Failure {
+    let left_out = said.iter().filter(|warning| warning.code == "hit-left-out");
+    let mut all: Vec<&str> = left_out.map(|warning| warning.message.as_str()).collect();
+    all.push(match all.is_empty() {
+        true => {
+            "one block is not enough to choose the number of modes; give it, as --modes 1 for a single resonance, or record \
+             more"
+        }
+        false => {
+            "the one hit that is left is not enough to choose the number of modes; hit again, without overdriving the inputs, \
+             or give the number, as --modes 1 for a single resonance"
+        }
+    });
+    Failure::failed(ErrorCode::TooFewSamples, all.join("; "))
 }
 
 /// The number of modes, one or more, with the smallest hold-out error.
