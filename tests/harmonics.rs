@@ -421,3 +421,27 @@ fn a_line_of_the_mains_does_not_decide_the_speed() {
     let report = folder.json(&[&HARMONICS[..], &more].concat());
     assert!((report["fundamental_hz"].as_f64().unwrap() - 30.0).abs() < 1e-3);
 }
+
+/// A line at order 6 is also order 5 or 7 of other speeds.
+#[test]
+fn a_speed_that_explains_all_lines_is_proposed() {
+    let folder = Folder::new();
+    let mut noise = Noise(9);
+    let line = |size: f64, order: f64| (size, 48.3 * order, order);
+    let parts = [
+        (2.0, 0.0, 0.0),
+        line(0.1, 1.0),
+        line(0.2, 2.0),
+        line(0.5, 6.0),
+        line(0.3, 12.0),
+    ];
+    let (shown, _) = steady(&parts, 10_000.0, 20_000);
+    let shown: Vec<f64> = shown.iter().map(|x| x + 2e-3 * noise.normal()).collect();
+    folder.write("in.csv", record(&shown, 10_000.0));
+    for given in ["30", "40", "42", "60"] {
+        let report = folder.json(&[&HARMONICS[..], &[given, "--json"]].concat());
+        let told = messages(&report, "fundamental-off");
+        let is_right = told.len() == 1 && told[0].ends_with("--fundamental 48.3");
+        assert!(is_right, "{given}: {report}");
+    }
+}

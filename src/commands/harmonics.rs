@@ -2,6 +2,7 @@
 
 mod filtered;
 mod level;
+mod lowest;
 mod mains;
 mod multiple;
 mod rounding;

@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use torqcomp_dsp::harmonics::{Component, Fundamental, Harmonics, fit, refine_fundamental};
 use torqcomp_dsp::store::SampleStore;
 
+use super::lowest;
 use super::mains::{self, grids_with_a_line_at};
 use crate::cli::REFINE_SPAN;
 use crate::print::rounded;
@@ -79,6 +80,10 @@ pub(super) fn off(
     let far = || within(FAR_SPAN).filter(|_| !is_there);
     let found = within(SPAN).or_else(far);
     found.map(|(found, shift_hz, span)| {
+        let both_hz = (fundamental_hz, found.frequency_hz);
+        if let Some(other) = lowest::instead_of(&samples, rate_hz, both_hz, orders) {
+            return other;
+        }
         let digits = rounded(found.frequency_hz, 7);
         let refine = match shift_hz < 0.01 * REFINE_SPAN * fundamental_hz {
             true => "--refine".to_owned(),
