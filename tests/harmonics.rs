@@ -445,3 +445,31 @@ fn a_speed_that_explains_all_lines_is_proposed() {
         assert!(is_right, "{given}: {report}");
     }
 }
+
+/// An order that is not asked for is the strongest: neither the refined speed nor the check of a constant one may suffer.
+#[test]
+fn a_strong_order_that_is_not_listed_biases_nothing() {
+    let folder = Folder::new();
+    for seed in 0..8 {
+        let mut noise = Noise(100 + seed);
+        let speed_hz = 30.0 + 15.0 * noise.uniform();
+        let line = |size, order: f64, phase| (size, order * speed_hz, phase);
+        let parts = [
+            (2.0, 0.0, 0.0),
+            line(0.3, 1.0, 6.0 * noise.uniform()),
+            line(0.2, 2.0, 6.0 * noise.uniform()),
+            line(0.5, 6.0, 6.0 * noise.uniform()),
+        ];
+        let (shown, _) = steady(&parts, 5000.0, 5000);
+        let shown: Vec<f64> = shown.iter().map(|x| x + 2e-3 * noise.normal()).collect();
+        folder.write("in.csv", record(&shown, 5000.0));
+        let given = format!("{:.3}", 1.005 * speed_hz);
+        let more = [given.as_str(), "--orders", "1,2", "--refine", "--json"];
+        let report = folder.json(&[&HARMONICS[..], &more].concat());
+        let number = |key: &str| report[key].as_f64().unwrap();
+        let (found, std) = (number("fundamental_hz"), number("fundamental_std_hz"));
+        assert!((found - speed_hz).abs() < 4.0 * std, "{speed_hz}: {report}");
+        assert_eq!(report["components"].as_array().unwrap().len(), 2);
+        assert!(messages(&report, "speed-changes").is_empty(), "{report}");
+    }
+}

@@ -1,5 +1,6 @@
 //! `harmonics`: component torques at a fundamental and its orders.
 
+mod checks;
 mod filtered;
 mod level;
 mod lowest;
@@ -8,6 +9,7 @@ mod multiple;
 mod rounding;
 mod speed;
 mod text;
+mod unlisted;
 
 use std::path::Path;
 
@@ -213,14 +215,23 @@ fn phase_reference(start: Moment, duration_s: f64) -> (Moment, f64) {
     }
 }
 
-/// The best-fitting fundamental near the given one.
+/// The best-fitting fundamental near the given one, by the requested orders and those that the record shows as well.
 fn refined(
     args: &cli::Harmonics,
     record: &UniformRecord,
     orders: &[f64],
 ) -> Result<Fundamental, Failure> {
     let (given_hz, span) = (args.fundamental, 0.01 * args.refine_span);
-    let found = mains::refine(&record.samples, record.rate_hz, (given_hz, span), orders);
+    let by =
+        |orders: &[f64]| mains::refine(&record.samples, record.rate_hz, (given_hz, span), orders);
+    let found = by(orders).and_then(|found| {
+        let all = unlisted::with_unlisted(record, found.frequency_hz, orders);
+        if all.len() > orders.len() {
+            by(&all)
+        } else {
+            Ok(found)
+        }
+    });
     found.map_err(|error| match error {
         Error::NotRefined { .. } => Failure::failed(
             ErrorCode::NotIdentifiable,
@@ -266,8 +277,12 @@ fn fit(
     let rated = chain.rated_n_m.map(|rated| rated * printed);
     let largest = largest(samples, &components, printed)?;
     warnings.extend(off_rated(largest, rated, &chain.applied.unit));
-    warnings.extend(of_orders(way, record, &fundamental, &orders));
-    warnings.extend(lost_warning(&components));
+    warnings.extend(checks::warnings(
+        way,
+        record,
+        (&fundamental, &orders),
+        &components,
+    ));
     warnings.extend(mains::warning(&components, duration_s));
     warnings.extend(of_quality(record, &seen, channel, chain)?);
     Ok(HarmonicsReport {
@@ -294,50 +309,6 @@ fn fit(
         residual_rms: found.residual_rms * printed,
         warnings,
     })
-}
-
-/// Checks that the speed is constant and as given, and that all orders are in the band of a compensated record.
-fn of_orders(
-    way: &WayBack,
-    record: &UniformRecord,
-    fundamental: &Fundamental,
-    orders: &[f64],
-) -> Vec<Warning> {
-    let hz = fundamental.frequency_hz;
-    let is_given = fundamental.std_hz.is_none();
-    let load = speed::load_changes(record, hz, orders);
-    // A load step leaves slow components that bias the speed slightly.
-    let multiple = multiple::warning(record, hz, orders, |hz| way.inverse(hz).norm());
-    let changing = match &multiple {
-        Some(_) => None,
-        None => speed::warning(record, hz, orders),
-    };
-    let is_steady = |others: &[&Option<Warning>]| others.iter().all(|found| found.is_none());
-    let sways = is_steady(&[&multiple, &changing])
-        .then(|| speed::sways(record, hz, orders))
-        .flatten();
-    // A speed that sways has no better mean.
-    let off = (is_given && is_steady(&[&multiple, &sways]))
-        .then(|| {
-            let off = speed::off(record, hz, orders, load.is_some());
-            off.or_else(|| multiple::other_unit(record, hz, orders))
-        })
-        .flatten();
-    let level = is_steady(&[&off, &changing, &sways])
-        .then(|| level::warning(record, hz, orders))
-        .flatten();
-    let is_compensated = way.stand.is_none();
-    let beyond = is_compensated.then(|| filtered::warning(record, hz, orders));
-    let all = [
-        multiple,
-        off,
-        changing,
-        sways,
-        level,
-        load,
-        beyond.flatten(),
-    ];
-    all.into_iter().flatten().collect()
 }
 
 /// Warnings from the samples themselves.
@@ -448,21 +419,4 @@ fn component(fitted: &harmonics::Component, printed: f64, way: &WayBack) -> Comp
 fn named(orders: &[String]) -> String {
     let word = if orders.len() == 1 { "order" } else { "orders" };
     format!("{word} {}", enumeration(orders, "and"))
-}
-
-fn lost_warning(components: &[ComponentTorque]) -> Option<Warning> {
-    let lost: Vec<String> = components
-        .iter()
-        .filter(|c| c.torque < 2.0 * c.std)
-        .map(|c| short(c.order))
-        .collect();
-    (!lost.is_empty()).then(|| {
-        Warning::new(
-            "components-lost-in-noise",
-            format!(
-                "below twice their own uncertainty, so they may be zero: {}",
-                named(&lost)
-            ),
-        )
-    })
 }

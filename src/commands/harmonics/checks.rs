@@ -1,0 +1,83 @@
+//! Checks of the fundamental and its orders.
+
+use torqcomp_dsp::harmonics::Fundamental;
+
+use super::{ComponentTorque, WayBack, filtered, level, multiple, named, speed, unlisted};
+use crate::print::short;
+use crate::recording::UniformRecord;
+use crate::warning::Warning;
+
+/// Warnings about the speed and the orders, and about components that are lost in noise.
+pub(super) fn warnings(
+    way: &WayBack,
+    record: &UniformRecord,
+    (fundamental, orders): (&Fundamental, &[f64]),
+    components: &[ComponentTorque],
+) -> Vec<Warning> {
+    let shown = unlisted::with_unlisted(record, fundamental.frequency_hz, orders);
+    let mut all = of_orders(way, record, fundamental, (orders, &shown));
+    all.extend(lost_warning(components));
+    all
+}
+
+/// Checks that the speed is constant and as given, and that all orders are in the band of a compensated record; `shown` are
+/// the requested orders and others that the record shows.
+fn of_orders(
+    way: &WayBack,
+    record: &UniformRecord,
+    fundamental: &Fundamental,
+    (orders, shown): (&[f64], &[f64]),
+) -> Vec<Warning> {
+    let hz = fundamental.frequency_hz;
+    let is_given = fundamental.std_hz.is_none();
+    let load = speed::load_changes(record, hz, orders);
+    // A load step leaves slow components that bias the speed slightly.
+    let multiple = multiple::warning(record, hz, orders, |hz| way.inverse(hz).norm());
+    let changing = match &multiple {
+        Some(_) => None,
+        None => speed::warning(record, hz, shown),
+    };
+    let is_steady = |others: &[&Option<Warning>]| others.iter().all(|found| found.is_none());
+    let sways = is_steady(&[&multiple, &changing])
+        .then(|| speed::sways(record, hz, shown))
+        .flatten();
+    // A speed that sways has no better mean.
+    let off = (is_given && is_steady(&[&multiple, &sways]))
+        .then(|| {
+            let off = speed::off(record, hz, shown, load.is_some());
+            off.or_else(|| multiple::other_unit(record, hz, orders))
+        })
+        .flatten();
+    let level = is_steady(&[&off, &changing, &sways])
+        .then(|| level::warning(record, hz, orders))
+        .flatten();
+    let is_compensated = way.stand.is_none();
+    let beyond = is_compensated.then(|| filtered::warning(record, hz, orders));
+    let all = [
+        multiple,
+        off,
+        changing,
+        sways,
+        level,
+        load,
+        beyond.flatten(),
+    ];
+    all.into_iter().flatten().collect()
+}
+
+fn lost_warning(components: &[ComponentTorque]) -> Option<Warning> {
+    let lost: Vec<String> = components
+        .iter()
+        .filter(|c| c.torque < 2.0 * c.std)
+        .map(|c| short(c.order))
+        .collect();
+    (!lost.is_empty()).then(|| {
+        Warning::new(
+            "components-lost-in-noise",
+            format!(
+                "below twice their own uncertainty, so they may be zero: {}",
+                named(&lost)
+            ),
+        )
+    })
+}
