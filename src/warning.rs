@@ -48,6 +48,7 @@ pub(crate) const CODES: &[(&str, &[[&str; 3]])] = &[
         ["orders-above-nyquist", "orders above half the sampling rate were left out", "record at a higher rate"],
         ["amplitude-changes", "the amplitude of a component changes over the record, so the components are averages", "select a shorter part with --range"],
         ["lines-between-orders", "strong lines lie between the orders: the given fundamental may be a multiple of the speed", "give --fundamental as the speed, or add the orders"],
+        ["orders-explain-little", "most of the record is neither orders of the fundamental nor noise", "select a part of constant speed with --range, or give its speed"],
         ["speed-changes", "the speed changes or fluctuates over the record, so the components are averages", "select a part of constant speed with --range"],
         ["phase-hidden", "the signal at the frequency of a line, or of spikes, masks its phase, so part of it remains", "record without excitation at this frequency"],
         ["resonance-elsewhere", "the record shows no resonance at the declared frequency, but one elsewhere", "determine the stand's constants with identify decay"],

@@ -473,3 +473,31 @@ fn a_strong_order_that_is_not_listed_biases_nothing() {
         assert!(messages(&report, "speed-changes").is_empty(), "{report}");
     }
 }
+
+/// A run-up from 25 to 100 Hz in 3 s, in part and as a whole, and a weak order in noise.
+#[test]
+fn orders_that_do_not_explain_the_record_are_said() {
+    let folder = Folder::new();
+    let mut noise = Noise(3);
+    let angle = |t: f64| TAU * (25.0 * t + 12.5 * t * t);
+    let sample = |i: usize| {
+        let angle = angle(i as f64 * 1e-4);
+        let order = |n: f64, size: f64| size * (n * angle + n).cos();
+        2.0 + order(1.0, 0.1) + order(6.0, 0.4) + order(12.0, 0.2) + 2e-3 * noise.normal()
+    };
+    let shown: Vec<f64> = (0..30_000).map(sample).collect();
+    folder.write("in.csv", record(&shown, 10_000.0));
+    for range in [&["--range", "1.1..1.3"][..], &[]] {
+        let report = folder.json(&[&HARMONICS[..], &["55", "--json"], range].concat());
+        let told = messages(&report, "orders-explain-little");
+        assert_eq!(told.len(), 1, "{range:?}: {report}");
+        let lost = messages(&report, "components-lost-in-noise");
+        assert!(lost.is_empty(), "{range:?}: {report}");
+    }
+    let weak = |i: i32| 0.01 * (TAU * 55.0 * f64::from(i) * 1e-4).cos() + noise.normal();
+    let weak: Vec<f64> = (0..30_000).map(weak).collect();
+    folder.write("in.csv", record(&weak, 10_000.0));
+    let report = folder.json(&[&HARMONICS[..], &["55", "--json"]].concat());
+    let told = messages(&report, "orders-explain-little");
+    assert!(told.is_empty(), "{report}");
+}

@@ -9,6 +9,7 @@ mod multiple;
 mod rounding;
 mod speed;
 mod text;
+mod unexplained;
 mod unlisted;
 
 use std::path::Path;
@@ -281,7 +282,7 @@ fn fit(
         way,
         record,
         (&fundamental, &orders),
-        &components,
+        (&found, &components),
     ));
     warnings.extend(mains::warning(&components, duration_s));
     warnings.extend(of_quality(record, &seen, channel, chain)?);

@@ -1,8 +1,10 @@
 //! Checks of the fundamental and its orders.
 
-use torqcomp_dsp::harmonics::Fundamental;
+use torqcomp_dsp::harmonics::{Fundamental, Harmonics};
 
-use super::{ComponentTorque, WayBack, filtered, level, multiple, named, speed, unlisted};
+use super::{
+    ComponentTorque, WayBack, filtered, level, multiple, named, speed, unexplained, unlisted,
+};
 use crate::print::short;
 use crate::recording::UniformRecord;
 use crate::warning::Warning;
@@ -12,11 +14,20 @@ pub(super) fn warnings(
     way: &WayBack,
     record: &UniformRecord,
     (fundamental, orders): (&Fundamental, &[f64]),
-    components: &[ComponentTorque],
+    (found, components): (&Harmonics, &[ComponentTorque]),
 ) -> Vec<Warning> {
     let shown = unlisted::with_unlisted(record, fundamental.frequency_hz, orders);
     let mut all = of_orders(way, record, fundamental, (orders, &shown));
-    all.extend(lost_warning(components));
+    let little = match all.is_empty() {
+        true => unexplained::warning(record, found, fundamental.frequency_hz, &shown),
+        false => None,
+    };
+    // Beside that, no component may be called zero.
+    let lost = match little {
+        Some(_) => None,
+        None => lost_warning(components),
+    };
+    all.extend(little.into_iter().chain(lost));
     all
 }
 
