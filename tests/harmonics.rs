@@ -422,6 +422,26 @@ fn a_line_of_the_mains_does_not_decide_the_speed() {
     assert!((report["fundamental_hz"].as_f64().unwrap() - 30.0).abs() < 1e-3);
 }
 
+/// Order 6, which is not listed, is that near a line of the mains.
+#[test]
+fn a_strong_order_beside_the_mains_is_no_changing_speed() {
+    let folder = Folder::new();
+    let mut noise = Noise(12);
+    let line = |size: f64, order: f64| (size, 33.37 * order, order);
+    let parts = [
+        (2.0, 0.0, 0.0),
+        line(0.3, 1.0),
+        line(0.2, 2.0),
+        line(0.5, 6.0),
+        line(0.05, 12.0),
+    ];
+    let (shown, _) = steady(&parts, 5000.0, 5000);
+    let shown: Vec<f64> = shown.iter().map(|x| x + 2e-3 * noise.normal()).collect();
+    folder.write("in.csv", record(&shown, 5000.0));
+    let report = folder.json(&[&HARMONICS[..], &["33.37", "--orders", "1,2", "--json"]].concat());
+    assert!(messages(&report, "speed-changes").is_empty(), "{report}");
+}
+
 /// A line at order 6 is also order 5 or 7 of other speeds.
 #[test]
 fn a_speed_that_explains_all_lines_is_proposed() {

@@ -226,7 +226,7 @@ fn refined(
     let by =
         |orders: &[f64]| mains::refine(&record.samples, record.rate_hz, (given_hz, span), orders);
     let found = by(orders).and_then(|found| {
-        let all = unlisted::with_unlisted(record, found.frequency_hz, orders);
+        let all = unlisted::for_refinement(record, found.frequency_hz, orders);
         if all.len() > orders.len() {
             by(&all)
         } else {

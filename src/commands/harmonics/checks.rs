@@ -16,7 +16,7 @@ pub(super) fn warnings(
     (fundamental, orders): (&Fundamental, &[f64]),
     (found, components): (&Harmonics, &[ComponentTorque]),
 ) -> Vec<Warning> {
-    let shown = unlisted::with_unlisted(record, fundamental.frequency_hz, orders);
+    let shown = unlisted::shown(record, fundamental.frequency_hz, orders);
     let mut all = of_orders(way, record, fundamental, (orders, &shown));
     let little = match all.is_empty() {
         true => unexplained::warning(record, found, fundamental.frequency_hz, &shown),

@@ -12,37 +12,50 @@ use crate::recording::UniformRecord;
 /// Highest whole order looked for.
 const HIGHEST: u32 = 30;
 
-/// The given orders and the others that the record shows at this fundamental, ascending. Lines that may be of the mains are
-/// no orders.
-pub(super) fn with_unlisted(
+/// The given orders and the others that the record shows at this fundamental.
+pub(super) fn shown(record: &UniformRecord, fundamental_hz: f64, orders: &[f64]) -> Vec<f64> {
+    joined(orders, unlisted(record, fundamental_hz, orders))
+}
+
+/// The same without others that may be lines of the mains, which would decide the speed.
+pub(super) fn for_refinement(
     record: &UniformRecord,
     fundamental_hz: f64,
     orders: &[f64],
 ) -> Vec<f64> {
-    let found = unlisted(record, fundamental_hz, orders).unwrap_or_default();
-    let mut all = [orders, &found].concat();
+    let duration_s = record.samples.count() as f64 / record.rate_hz;
+    let may_be_mains = |order: &f64| {
+        let mut grids = grids_with_a_line_at(order * fundamental_hz, duration_s);
+        grids.next().is_some()
+    };
+    let mut others = unlisted(record, fundamental_hz, orders);
+    others.retain(|order| !may_be_mains(order));
+    joined(orders, others)
+}
+
+fn joined(orders: &[f64], others: Vec<f64>) -> Vec<f64> {
+    let mut all = [orders, &others].concat();
     all.sort_by(f64::total_cmp);
     all
 }
 
-fn unlisted(record: &UniformRecord, fundamental_hz: f64, orders: &[f64]) -> Option<Vec<f64>> {
-    let count = record.samples.count().min(FIRST);
-    let duration_s = count as f64 / record.rate_hz;
+/// Whole orders that the record shows and that are not among the given ones.
+fn unlisted(record: &UniformRecord, fundamental_hz: f64, orders: &[f64]) -> Vec<f64> {
     let is_listed = |order: f64| orders.iter().any(|own| (own - order).abs() < 0.5);
     let is_seen = |order: &f64| order * fundamental_hz < 0.5 * record.rate_hz;
     let others = (1..=HIGHEST).map(f64::from).filter(is_seen);
     let others: Vec<f64> = others.filter(|order| !is_listed(*order)).collect();
     if others.is_empty() {
-        return None;
+        return others;
     }
-    let samples = record.samples.part(0..count).ok()?;
     let all = [orders, &others].concat();
     let fundamental = Fundamental::given(fundamental_hz);
-    let fitted = fit(&samples[..], record.rate_hz, 0.0, fundamental, &all).ok()?;
-    let is_order = |c: &&Component| {
-        let mut grids = grids_with_a_line_at(c.frequency_hz, duration_s);
-        is_sure(c) && !is_listed(c.order) && grids.next().is_none()
-    };
-    let found = fitted.components.iter().filter(is_order);
-    Some(found.map(|c| c.order).collect())
+    let samples = record.samples.part(0..record.samples.count().min(FIRST));
+    let fitted = samples.and_then(|s| fit(&s[..], record.rate_hz, 0.0, fundamental, &all));
+    // A record too short to separate all of them shows none.
+    let components: Vec<Component> = fitted.map_or_else(|_| Vec::new(), |found| found.components);
+    let found = components
+        .iter()
+        .filter(|c| is_sure(c) && !is_listed(c.order));
+    found.map(|c| c.order).collect()
 }
