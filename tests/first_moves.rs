@@ -903,8 +903,9 @@ fn strong_orders_hide_no_resonance() {
                 let passed = steps.iter().filter(|at| t > **at).count();
                 2.0 + 0.3 * (passed % 2) as f64 + order(1.0) + order(6.0)
             };
-            let sample = |i: usize| respond(torque(i as f64 / 5000.0)) + 2e-3 * noise.normal();
-            let motion: Vec<f64> = (0..15_000).map(sample).collect();
+            // From a second before the record on, so that the motor runs at its beginning.
+            let sample = |i: i32| respond(torque(f64::from(i) / 5000.0)) + 2e-3 * noise.normal();
+            let motion: Vec<f64> = (-5000..15_000).map(sample).skip(5000).collect();
             folder.write("in.csv", sampled("T [N m]", 5000.0, 15_000, |i| motion[i]));
             for (hz, ratio, said) in [
                 ("162 Hz", "0.02", Some("resonance-elsewhere")),
