@@ -216,12 +216,15 @@ fn phase_reference(start: Moment, duration_s: f64) -> (Moment, f64) {
     }
 }
 
-/// The best-fitting fundamental near the given one, by the requested orders and those that the record shows as well.
-fn refined(
+/// The given fundamental, or the best-fitting one near it, by the requested orders and those that the record shows as well.
+fn fundamental(
     args: &cli::Harmonics,
     record: &UniformRecord,
     orders: &[f64],
 ) -> Result<Fundamental, Failure> {
+    if !args.refine {
+        return Ok(Fundamental::given(args.fundamental));
+    }
     let (given_hz, span) = (args.fundamental, 0.01 * args.refine_span);
     let by =
         |orders: &[f64]| mains::refine(&record.samples, record.rate_hz, (given_hz, span), orders);
@@ -259,10 +262,7 @@ fn fit(
     let duration_s = samples.count() as f64 / record.rate_hz;
     let mut warnings = of_inputs(way, record);
     let orders = visible_orders(args, record.rate_hz, &mut warnings)?;
-    let fundamental = match args.refine {
-        true => refined(args, record, &orders)?,
-        false => Fundamental::given(args.fundamental),
-    };
+    let fundamental = fundamental(args, record, &orders)?;
     let (reference, start_s) = phase_reference(record.start, duration_s);
     let mut found = harmonics::fit(samples, record.rate_hz, start_s, fundamental, &orders)?;
     let seen = samples.part(0..samples.count().min(excerpt::OF_PASSES))?;
