@@ -16,6 +16,7 @@ use super::residual_tests::without_mean;
 use super::score::ScoredModel;
 use super::structure::{FitContext, LateStand, PlainStand, Structure};
 use torqcomp_dsp::dot;
+use torqcomp_dsp::peaks::vertex;
 
 /// Number of parts of a record with a separate estimate of the shift.
 const PARTS: usize = 8;
@@ -270,20 +271,14 @@ fn peak(x: &[f64], y: &[f64], any_sign: bool) -> Option<(f64, f64)> {
     };
     let count = products.len();
     let best = (0..count).max_by(|a, b| size(*a).total_cmp(&size(*b)))?;
-    let [before, at, after] = [count - 1, 0, 1].map(|step| size((best + step) % count));
-    let bend = before - 2.0 * at + after;
-    let part = if bend < 0.0 {
-        0.5 * (before - after) / bend
-    } else {
-        0.0
-    };
+    let (part, top) = vertex([count - 1, 0, 1].map(|step| size((best + step) % count)));
     let whole = if best > count / 2 {
         best as f64 - count as f64
     } else {
         best as f64
     };
     let sign = products[best].signum();
-    Some((whole + part, sign * (at - 0.25 * (before - after) * part)))
+    Some((whole + part, sign * top))
 }
 
 /// Sums of products `x(i) y(i + k)` for lags `k`, with negative lags at the end.

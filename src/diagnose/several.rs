@@ -57,10 +57,11 @@ impl SearchState {
         if let Some(guard) = self.only_law(&base, round.accepted(), workers) {
             return self.withdraw(guard, self.before.clone());
         }
-        let starts = self.starts(&base, &round, workers);
+        let mut starts = self.starts(&base, &round, workers);
+        starts.truncate(WAYS);
         drop((base, round));
         let mut best: Option<Way> = None;
-        for (k, start) in starts.iter().take(WAYS).enumerate() {
+        for (k, start) in starts.iter().enumerate() {
             let beats = |best: &Way| {
                 let is_open = remains(&best.after, &best.tests, self.noise_floor);
                 is_open || start.criterion() < best.after.criterion()
@@ -68,8 +69,7 @@ impl SearchState {
             if !best.as_ref().is_none_or(beats) {
                 continue;
             }
-            let other = starts[k + 1..].first().filter(|_| k + 1 < WAYS);
-            let way = self.follow((start, other), coarse, workers);
+            let way = self.follow((start, starts.get(k + 1)), coarse, workers);
             let criterion = way.after.criterion();
             if best
                 .as_ref()

@@ -152,6 +152,25 @@ pub fn lines(samples: &[f64], share: f64) -> Vec<Line> {
     all
 }
 
+/// Vertex of the parabola through three values at equal distances, the middle one a maximum: its place relative to that, in
+/// these distances, and its height. The middle value itself where they do not bend down.
+///
+/// ```
+/// // 3 − (t − ¼)² at t = −1, 0 and 1.
+/// let values = [1.4375, 2.9375, 2.4375];
+/// assert_eq!(torqcomp_dsp::peaks::vertex(values), (0.25, 3.0));
+/// ```
+#[must_use]
+pub fn vertex([before, at, after]: [f64; 3]) -> (f64, f64) {
+    let bend = before - 2.0 * at + after;
+    let place = if bend < 0.0 {
+        0.5 * (before - after) / bend
+    } else {
+        0.0
+    };
+    (place, at - 0.25 * (before - after) * place)
+}
+
 /// Bins on either side of a steady line that its window occupies, and number of bins beyond them that it must exceed.
 const LOBE: f64 = 4.0;
 const BESIDE: f64 = 16.0;
@@ -206,17 +225,8 @@ fn steady_lines(samples: &[f64], rate_hz: f64) -> Vec<f64> {
     lines.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
     lines.truncate(MOST_STEADY);
     let step_hz = rate_hz / size as f64;
-    // The vertex of the parabola through the logarithms.
-    let place = |k: usize| {
-        let [before, at, after] = [k - 1, k, k + 1].map(|k| power[k].max(f64::MIN_POSITIVE).ln());
-        let curve = before - 2.0 * at + after;
-        k as f64
-            + if curve < 0.0 {
-                0.5 * (before - after) / curve
-            } else {
-                0.0
-            }
-    };
+    let logarithm = |k: usize| power[k].max(f64::MIN_POSITIVE).ln();
+    let place = |k: usize| k as f64 + vertex([k - 1, k, k + 1].map(logarithm)).0;
     lines.into_iter().map(|k| step_hz * place(k)).collect()
 }
 

@@ -1,9 +1,7 @@
 //! Which of the speeds that explain the lines of a record is meant: a line at 290 Hz is order 5 of 58 Hz as well as order
 //! 6 of 48.3 Hz.
 
-use torqcomp_dsp::harmonics::{Component, Fundamental, fit};
-
-use super::speed::is_sure;
+use super::speed::sure_orders;
 use crate::print::{enumeration, rounded};
 use crate::warning::Warning;
 
@@ -66,13 +64,7 @@ pub(super) fn instead_of(
 fn shown_at(samples: &[f64], rate_hz: f64, hz: f64, orders: &[f64]) -> Vec<f64> {
     let seen = orders.iter().filter(|order| **order * hz < 0.5 * rate_hz);
     let seen: Vec<f64> = seen.copied().collect();
-    let fitted = fit(samples, rate_hz, 0.0, Fundamental::given(hz), &seen);
-    let components: Vec<Component> = fitted.map_or_else(|_| Vec::new(), |found| found.components);
-    components
-        .iter()
-        .filter(|c| is_sure(c))
-        .map(|c| c.order)
-        .collect()
+    sure_orders(samples, rate_hz, hz, &seen)
 }
 
 /// The greatest common divisor of orders; `None` if there is none of them, or not all are whole.

@@ -17,14 +17,18 @@ const OFF: f64 = 0.01;
 const GRIDS_HZ: [f64; 2] = [50.0, 60.0];
 
 /// The mains of which a line is at a frequency, as far as a record of that duration shows it.
-pub(super) fn grids_with_a_line_at(
-    frequency_hz: f64,
-    duration_s: f64,
-) -> impl Iterator<Item = f64> {
+fn grids_with_a_line_at(frequency_hz: f64, duration_s: f64) -> impl Iterator<Item = f64> {
     GRIDS_HZ.into_iter().filter(move |grid_hz| {
         let line_hz = (frequency_hz / grid_hz).round().clamp(1.0, MAINS_LINES) * grid_hz;
         (frequency_hz - line_hz).abs() < 1.0 / duration_s
     })
+}
+
+/// Whether such a line is at a frequency.
+pub(super) fn is_at_mains(frequency_hz: f64, duration_s: f64) -> bool {
+    grids_with_a_line_at(frequency_hz, duration_s)
+        .next()
+        .is_some()
 }
 
 /// The fundamental within a relative range around a given one. If only orders that mains lines may be show it, it is that
@@ -53,10 +57,7 @@ pub(super) fn refine(
         let fitted = fit(samples, rate_hz, 0.0, *found, orders);
         fitted.is_ok_and(|fitted| {
             let mut components = fitted.components.iter();
-            components.any(|c| {
-                let mut grids = grids_with_a_line_at(c.frequency_hz, duration_s);
-                is_sure(c) && grids.next().is_none()
-            })
+            components.any(|c| is_sure(c) && !is_at_mains(c.frequency_hz, duration_s))
         })
     };
     if of_all.as_ref().is_ok_and(is_shown) {

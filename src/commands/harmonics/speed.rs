@@ -6,7 +6,7 @@ use torqcomp_dsp::harmonics::{Component, Fundamental, Harmonics, fit, refine_fun
 use torqcomp_dsp::store::SampleStore;
 
 use super::lowest;
-use super::mains::{self, grids_with_a_line_at};
+use super::mains::{self, is_at_mains};
 use crate::cli::REFINE_SPAN;
 use crate::print::rounded;
 use crate::recording::UniformRecord;
@@ -257,17 +257,23 @@ fn sways_by(orders: &[f64], shown: &[Vec<Option<[f64; 2]>>]) -> Option<Warning> 
 /// Whether an order that is significant at the given speed is not at the one found: a strong line that is no order has
 /// attracted another. An order at the mains may be their line, which a wrong speed hits by chance.
 fn is_attracted(given: &Harmonics, found: &Harmonics, duration_s: f64) -> bool {
-    let may_be_mains = |c: &Component| {
-        let mut grids = grids_with_a_line_at(c.frequency_hz, duration_s);
-        grids.next().is_some()
-    };
     let mut both = given.components.iter().zip(&found.components);
-    both.any(|(given, found)| is_sure(given) && !is_sure(found) && !may_be_mains(given))
+    both.any(|(given, found)| {
+        is_sure(given) && !is_sure(found) && !is_at_mains(given.frequency_hz, duration_s)
+    })
 }
 
 /// Whether a component is significant.
 pub(super) fn is_sure(component: &Component) -> bool {
     component.phasor.norm() > THERE * component.std_amplitude
+}
+
+/// The orders that are significant at a fundamental; a record too short to separate them shows none.
+pub(super) fn sure_orders(samples: &[f64], rate_hz: f64, hz: f64, orders: &[f64]) -> Vec<f64> {
+    let fitted = fit(samples, rate_hz, 0.0, Fundamental::given(hz), orders);
+    let components = fitted.map_or_else(|_| Vec::new(), |found| found.components);
+    let sure = components.iter().filter(|c| is_sure(c));
+    sure.map(|c| c.order).collect()
 }
 
 /// By each significant order in each window: the angle of the shaft relative to its mean, and the variance of that.

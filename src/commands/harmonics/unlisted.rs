@@ -2,11 +2,10 @@
 //!
 //! A strong order that is not fitted leaks into its neighbours, and pulls a fundamental that is fitted to these alone.
 
-use torqcomp_dsp::harmonics::{Component, Fundamental, fit};
 use torqcomp_dsp::store::SampleStore;
 
-use super::mains::grids_with_a_line_at;
-use super::speed::{FIRST, is_sure};
+use super::mains::is_at_mains;
+use super::speed::{FIRST, sure_orders};
 use crate::recording::UniformRecord;
 
 /// Highest whole order looked for.
@@ -24,12 +23,8 @@ pub(super) fn for_refinement(
     orders: &[f64],
 ) -> Vec<f64> {
     let duration_s = record.samples.count() as f64 / record.rate_hz;
-    let may_be_mains = |order: &f64| {
-        let mut grids = grids_with_a_line_at(order * fundamental_hz, duration_s);
-        grids.next().is_some()
-    };
     let mut others = unlisted(record, fundamental_hz, orders);
-    others.retain(|order| !may_be_mains(order));
+    others.retain(|order| !is_at_mains(order * fundamental_hz, duration_s));
     joined(orders, others)
 }
 
@@ -49,13 +44,11 @@ fn unlisted(record: &UniformRecord, fundamental_hz: f64, orders: &[f64]) -> Vec<
         return others;
     }
     let all = [orders, &others].concat();
-    let fundamental = Fundamental::given(fundamental_hz);
-    let samples = record.samples.part(0..record.samples.count().min(FIRST));
-    let fitted = samples.and_then(|s| fit(&s[..], record.rate_hz, 0.0, fundamental, &all));
-    // A record too short to separate all of them shows none.
-    let components: Vec<Component> = fitted.map_or_else(|_| Vec::new(), |found| found.components);
-    let found = components
-        .iter()
-        .filter(|c| is_sure(c) && !is_listed(c.order));
-    found.map(|c| c.order).collect()
+    let first = 0..record.samples.count().min(FIRST);
+    let Ok(samples) = record.samples.part(first) else {
+        return Vec::new();
+    };
+    let mut sure = sure_orders(&samples, record.rate_hz, fundamental_hz, &all);
+    sure.retain(|order| !is_listed(*order));
+    sure
 }

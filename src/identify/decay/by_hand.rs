@@ -3,6 +3,8 @@
 
 use std::f64::consts::{PI, TAU};
 
+use torqcomp_dsp::peaks::vertex;
+
 use super::modes::{ModesFit, Stretch};
 use crate::identify::{Comparison, Identification, NamedEstimate};
 
@@ -48,14 +50,8 @@ fn peaks_of(stretch: &Stretch, offset: f64, half_period_s: f64) -> Vec<(f64, f64
         if !(same_side && here >= before && here > after) {
             continue;
         }
-        let bend = before - 2.0 * here + after;
-        let shift = if bend < 0.0 {
-            0.5 * (before - after) / bend
-        } else {
-            0.0
-        };
+        let (shift, size) = vertex([before, here, after]);
         let t = times[i] + shift * 0.5 * (times[i + 1] - times[i - 1]);
-        let size = here - 0.25 * (before - after) * shift;
         match found.last_mut() {
             // Noise splits a peak into several; keep the largest.
             Some(last) if t - last.0 < 0.6 * half_period_s => {

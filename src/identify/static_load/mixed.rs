@@ -8,8 +8,8 @@
 //! hysteresis at load step j, or in range j of the load if there are many steps, plus in loading, minus in unloading;
 //! a_s: zero of series s; b_p: deviation of the sensitivity at mounting p, or in series p at a single mounting; w:
 //! random drift of the zero, a random walk over the rows; e: independent errors of the readings. d and g are estimated
-//! where they are significant; a, b and the steps of w are normal with variances that maximise the restricted likelihood. (H. D. Patterson, R. Thompson,
-//! Biometrika 58 (1971), 545; C. R. Henderson, Biometrics 31 (1975), 423.)
+//! where they are significant; a, b and the steps of w are normal with variances that maximise the restricted
+//! likelihood. (H. D. Patterson, R. Thompson, Biometrika 58 (1971), 545; C. R. Henderson, Biometrics 31 (1975), 423.)
 //!
 //! An estimate whose variance comes from few series follows Student's distribution, with the degrees of freedom of
 //! Welch and Satterthwaite; its standard uncertainty is enlarged so that ±1.96 of it cover 95 %. The sensitivity over m

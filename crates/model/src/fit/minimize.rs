@@ -232,21 +232,20 @@ impl<'a> State<'a> {
     /// Tries one step.
     fn advance(&mut self) -> Result<Progress, FitError> {
         let room = self.room();
-        let Some(step) = step(&self.reduced, &self.scaling, self.lambda, &room) else {
+        let Some(mut step) = step(&self.reduced, &self.scaling, self.lambda, &room) else {
             return Ok(Progress::Refused);
         };
         let after = &self.reduced.c + &self.reduced.r * &step;
         let predicted = self.reduced.c.norm_squared() - after.norm_squared();
         let mut trial = self.values.clone();
         let mut moved = 0.0_f64;
-        for (index, d) in self.how.free.iter().zip(step.iter()) {
+        for (index, d) in self.how.free.iter().zip(step.iter_mut()) {
             let parameter = &self.how.parameters[*index];
-            trial[*index] = (trial[*index] + d).clamp(parameter.lower, parameter.upper);
-            let size = self.values[*index].abs().max(1e-3 * parameter.scale);
-            moved = moved.max((trial[*index] - self.values[*index]).abs() / size);
+            let value = self.values[*index];
+            trial[*index] = (value + *d).clamp(parameter.lower, parameter.upper);
+            *d = trial[*index] - value;
+            moved = moved.max(d.abs() / value.abs().max(1e-3 * parameter.scale));
         }
-        let made = self.how.free.iter().map(|i| trial[*i] - self.values[*i]);
-        let made = DVector::from_iterator(step.len(), made);
         if moved == 0.0 {
             return Ok(Progress::Ended(StopReason::NoProgress));
         }
@@ -272,7 +271,7 @@ impl<'a> State<'a> {
         match (small_gain, moved <= tolerance) {
             (true, _) => Ok(Progress::Ended(StopReason::Reduction)),
             (_, true) => Ok(Progress::Ended(StopReason::Step)),
-            _ => self.go_on(gain / predicted, &made, &before),
+            _ => self.go_on(gain / predicted, &step, &before),
         }
     }
 
