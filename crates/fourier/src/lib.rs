@@ -6,10 +6,10 @@
 //! LLVM code. This crate is the only one to use it.
 
 mod dot;
+mod plans;
 
 use std::sync::Arc;
 
-use realfft::RealFftPlanner;
 use realfft::num_complex::Complex64;
 pub use realfft::{ComplexToReal, RealToComplex};
 
@@ -29,14 +29,14 @@ pub use dot::{dot, rms};
 #[inline(never)]
 #[must_use]
 pub fn forward(length: usize) -> Arc<dyn RealToComplex<f64>> {
-    RealFftPlanner::new().plan_fft_forward(length)
+    plans::with_planner(length, |planner| planner.plan_fft_forward(length))
 }
 
 /// The inverse transform, from `length / 2 + 1` bins to samples multiplied by `length`.
 #[inline(never)]
 #[must_use]
 pub fn inverse(length: usize) -> Arc<dyn ComplexToReal<f64>> {
-    RealFftPlanner::new().plan_fft_inverse(length)
+    plans::with_planner(length, |planner| planner.plan_fft_inverse(length))
 }
 
 /// Samples after which a rotating phasor is computed anew, which limits its rounding error.
