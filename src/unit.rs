@@ -1,6 +1,7 @@
 //! Units as files write them.
 
-use torqcomp_model::{Dimension, Unit};
+use torqcomp_decimal::digits;
+use torqcomp_model::{Dimension, Kind, Unit};
 
 use crate::failure::{ErrorCode, Failure};
 
@@ -62,6 +63,14 @@ impl NamedUnit {
         }
     }
 
+    /// The unit with its masses read as weights, if that makes it one of this dimension: `kgf cm` for `kg cm` as a
+    /// torque.
+    pub(crate) fn weight_as(&self, dimension: Dimension) -> Option<String> {
+        let [force, _] = Unit::readings_of_weight(&self.text)?;
+        let is_weight = |text: &String| Unit::parse(text).is_ok_and(|u| u.dimension() == dimension);
+        Some(force).filter(|force| self.unit.dimension() != dimension && is_weight(force))
+    }
+
     /// Whether it is a unit of time.
     #[must_use]
     pub fn is_time(&self) -> bool {
@@ -78,6 +87,44 @@ pub struct RecordedChannel<'a> {
     pub unit: Option<&'a NamedUnit>,
     /// Its unit as spelled in the file.
     pub unit_text: Option<&'a str>,
+}
+
+impl RecordedChannel<'_> {
+    /// Failure for a unit that is unknown as spelled in the file, with what to do.
+    pub(crate) fn unknown_unit(&self, text: &str, advice: &str) -> Failure {
+        let why = Unit::parse(text)
+            .err()
+            .map_or_else(String::new, |error| format!(": {error}"));
+        Failure::failed(
+            ErrorCode::UnitUnclear,
+            format_args!(
+                "the unit \"{text}\" of the channel \"{}\" is unknown{why}; {advice}",
+                self.name
+            ),
+        )
+    }
+
+    /// Failure for a unit between force and mass, such as oz-in, where a torque is expected.
+    pub(crate) fn unclear_weight(&self, unit: &NamedUnit) -> Option<Failure> {
+        let text = &unit.text;
+        let [force, mass] = Unit::readings_of_weight(text)?;
+        let size = Kind::Torque.parse(&format!("1 {force}"));
+        let torque = size.map_or_else(
+            |_| format!("as a force, write --unit \"{force}\""),
+            |size| {
+                let size = digits::text(size, 5);
+                format!("if it is a torque, give --unit \"{force}\" (1 {force} = {size} N m)")
+            },
+        );
+        Some(Failure::failed(
+            ErrorCode::UnitUnclear,
+            format_args!(
+                "the channel \"{}\" is in \"{text}\", which can be read with a force or with a mass; {torque}; \
+                 \"{mass}\" cannot be converted to torque",
+                self.name
+            ),
+        ))
+    }
 }
 
 /// Text before and inside brackets at the end of a heading.

@@ -272,6 +272,8 @@ fn columns_that_the_stand_does_not_take_are_refused() {
             "--unit",
         ],
     );
+    folder.write("inch.csv", text.replace("applied_n_m", "applied [oz-in]"));
+    simulate("inch.csv", &["applied"]).says(1, &["--unit \"ozf-in\" (1 ozf-in = 0.0070616 N m)"]);
     folder.write("bare.csv", text.replace("applied_n_m", "load"));
     simulate("bare.csv", &["load"]).says(
         0,

@@ -334,26 +334,27 @@ fn applied_unit(
         text: expected.to_owned(),
         unit: Unit::parse(expected).map_err(Failure::of(ErrorCode::UnitUnclear))?,
     };
-    match chosen.unit {
-        Some(given) if given.unit.dimension() == wanted.unit.dimension() => Ok(given.clone()),
-        Some(given) => Err(Failure::failed(
-            ErrorCode::UnitUnsuitable,
-            format_args!(
-                "the channel \"{}\" is in {}, and what acts on this stand is in {expected}; choose another column with \
-             --applied, or give the right unit with --unit",
-                chosen.name, given.text
-            ),
+    match (chosen.unit, chosen.unit_text) {
+        (Some(given), _) if given.unit.dimension() == wanted.unit.dimension() => Ok(given.clone()),
+        (Some(given), _) => {
+            let is_weight = given.weight_as(wanted.unit.dimension()).is_some();
+            let unclear = is_weight.then(|| chosen.unclear_weight(given)).flatten();
+            Err(unclear.unwrap_or_else(|| {
+                Failure::failed(
+                    ErrorCode::UnitUnsuitable,
+                    format_args!(
+                        "the channel \"{}\" is in {}, and what acts on this stand is in {expected}; choose another \
+                         column with --applied, or give the right unit with --unit",
+                        chosen.name, given.text
+                    ),
+                )
+            }))
+        }
+        (None, Some(text)) => Err(chosen.unknown_unit(
+            text,
+            &format!("this stand takes {expected}; give the right unit with --unit"),
         )),
-        None if chosen.unit_text.is_some() => Err(Failure::failed(
-            ErrorCode::UnitUnclear,
-            format_args!(
-                "the unit \"{}\" of the channel \"{}\" is unknown; this stand takes {expected}; give the right unit \
-                 with --unit",
-                chosen.unit_text.unwrap_or_default(),
-                chosen.name
-            ),
-        )),
-        None => {
+        (None, None) => {
             warnings.push(Warning::new(
                 "unit-assumed",
                 format!(

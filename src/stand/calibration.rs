@@ -1,6 +1,5 @@
 //! Conversion of a recorded channel to the applied quantity: unit, calibration, response.
 
-use torqcomp_decimal::digits;
 use torqcomp_dsp::conversion::Conversion;
 use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit, UnitSystem};
 
@@ -251,7 +250,7 @@ impl Stand {
                 std: ConstantStd::NotNeeded,
                 ..StaticLaw::of(Conversion::linear(1.0, 0.0))?
             },
-            _ => return Err(no_torque(channel.name, named)),
+            _ => return Err(no_torque(channel, named)),
         };
         Ok(Calibration {
             recorded_factor: signal.map_or(named.unit.factor(), |s| s.factor(&named.unit)),
@@ -381,55 +380,33 @@ fn without_unit(channel: RecordedChannel) -> Failure {
                  give it with its unit, as --full-scale \"10 V\""
             ),
         ),
-        Some(text) => {
-            let why = Unit::parse(text)
-                .err()
-                .map_or_else(String::new, |error| format!(": {error}"));
-            Failure::failed(
-                ErrorCode::UnitUnclear,
-                format_args!(
-                    "the unit \"{text}\" of the channel \"{name}\" is unknown{why}; give a known one with --unit, \
-                     such as V, mV/V, \"N m\""
-                ),
-            )
-        }
+        Some(text) => channel.unknown_unit(
+            text,
+            "give a known one with --unit, such as V, mV/V, \"N m\"",
+        ),
     }
 }
 
 /// Failure for a unit that gives no torque, with the question that resolves it.
-fn no_torque(channel: &str, named: &NamedUnit) -> Failure {
-    let text = &named.text;
+fn no_torque(channel: RecordedChannel, named: &NamedUnit) -> Failure {
+    let (name, text) = (channel.name, &named.text);
     if named.unit.ratio_of() == Some(RatioOf::Anything) {
         return Failure::failed(
             ErrorCode::UnitUnclear,
             format_args!(
-                "the channel \"{channel}\" is in \"{text}\", which could be bridge output over excitation, a strain, \
+                "the channel \"{name}\" is in \"{text}\", which could be bridge output over excitation, a strain, \
                  or a fraction of full scale; give --unit \"{text} V/V\" for the first or \"{text} strain\" for the \
                  second"
             ),
         );
     }
-    if let Some([force, mass]) = Unit::readings_of_weight(text) {
-        let size = Kind::Torque.parse(&format!("1 {force}"));
-        let torque = size.map_or_else(
-            |_| format!("as a force, write --unit \"{force}\""),
-            |size| {
-                let size = digits::text(size, 5);
-                format!("if it is a torque, give --unit \"{force}\" (1 {force} = {size} N m)")
-            },
-        );
-        return Failure::failed(
-            ErrorCode::UnitUnclear,
-            format_args!(
-                "the channel \"{channel}\" is in \"{text}\", which can be read with a force or with a mass; {torque}; \
-                 \"{mass}\" cannot be converted to torque"
-            ),
-        );
+    if let Some(unclear) = channel.unclear_weight(named) {
+        return unclear;
     }
     Failure::failed(
         ErrorCode::UnitUnsuitable,
         format_args!(
-            "the channel \"{channel}\" is in \"{text}\" ({}), which cannot be converted to torque; expected volts, \
+            "the channel \"{name}\" is in \"{text}\" ({}), which cannot be converted to torque; expected volts, \
              mV/V, mA, Hz, strain, torque or force",
             named.unit.dimension()
         ),

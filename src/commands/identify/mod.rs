@@ -13,7 +13,7 @@ mod static_load;
 
 use std::path::{Path, PathBuf};
 
-use torqcomp_model::{Dimension, Kind, Unit, UnitSystem};
+use torqcomp_model::{Dimension, Kind, UnitSystem};
 
 use super::{Outcome, conclude, same};
 use crate::cli::identify::{Findings, Identify, Test};
@@ -195,29 +195,11 @@ fn unit_or(channel: RecordedChannel, flag: &str) -> Result<NamedUnit, Failure> {
         match channel.unit_text {
             None => Failure::failed(
                 ErrorCode::UnitUnclear,
-                format_args!(
-                    "channel \"{name}\" has no unit; give it with {flag}"
-                ),
+                format_args!("channel \"{name}\" has no unit; give it with {flag}"),
             ),
-            Some(text) => Failure::failed(
-                ErrorCode::UnitUnclear,
-                format_args!(
-                    "the unit \"{text}\" of channel \"{name}\" is unknown{}; give a known one with {flag}",
-                    match Unit::parse(text) {
-                        Err(why) => format!(" ({why})"),
-                        Ok(_) => String::new(),
-                    }
-                ),
-            ),
+            Some(text) => channel.unknown_unit(text, &format!("give a known one with {flag}")),
         }
     })
-}
-
-/// A unit with its masses read as weights, if that makes it one of this dimension: `kgf cm` for `kg cm` as a torque.
-fn weight_as(unit: &NamedUnit, dimension: Dimension) -> Option<String> {
-    let [force, _] = Unit::readings_of_weight(&unit.text)?;
-    let is_weight = |text: &String| Unit::parse(text).is_ok_and(|u| u.dimension() == dimension);
-    Some(force).filter(|force| unit.unit.dimension() != dimension && is_weight(force))
 }
 
 /// Reads a quantity from the command line that must be greater than 0.

@@ -4,7 +4,7 @@ use torqcomp_model::Estimate;
 
 use super::constants::{Ratios, from_ratios, from_residue};
 use super::factor::factor_of;
-use super::{FORCE, Recorded, TORQUE, deliver, entry, radius, stand_text, unit_or, weight_as};
+use super::{FORCE, Recorded, TORQUE, deliver, entry, radius, stand_text, unit_or};
 use super::{modes, rest};
 use crate::cli::identify::Response;
 use crate::commands::Outcome;
@@ -211,7 +211,7 @@ fn to_torque(force: &mut Channel, radius_m: f64) -> Result<(), Failure> {
                 "--radius goes with a force; --applied \"{}\" is in {}{}",
                 force.name,
                 unit.text,
-                match (TransducerSignal::of(&unit.unit), weight_as(&unit, FORCE)) {
+                match (TransducerSignal::of(&unit.unit), unit.weight_as(FORCE)) {
                     (Some(_), _) => {
                         ": give the inverse of the sensitivity of the hammer as --torque-factor, such as \"444.4 N/V\" \
                          for 2.25 mV/N, or leave --radius out for natural frequency and damping alone"

@@ -5,9 +5,7 @@ use std::collections::HashMap;
 use torqcomp_decimal::digits;
 use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit};
 
-use super::{
-    FORCE, Recorded, TORQUE, deliver, entry, quantity, radius, replaced, unit_or, weight_as,
-};
+use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, radius, replaced, unit_or};
 use crate::cli::identify::Static;
 use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
@@ -282,7 +280,7 @@ fn refuse_unclear_weight(args: &Static, unit: &NamedUnit) -> Result<(), Failure>
             ),
         ));
     }
-    if let Some(force) = weight_as(unit, TORQUE) {
+    if let Some(force) = unit.weight_as(TORQUE) {
         return Err(Failure::usage(
             ErrorCode::UnitUnclear,
             format_args!(
