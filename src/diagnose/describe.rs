@@ -42,7 +42,13 @@ pub fn residual(
         };
         parts.push(format!("{ratio} times the noise floor"));
     }
-    parts.push(if tests.white { "white" } else { "not white" }.to_owned());
+    parts.push(match tests.first_order_noise {
+        Some(correlation) => format!(
+            "coloured as first-order noise, with a correlation of {correlation:.2} between neighbouring samples"
+        ),
+        None if tests.white => "white".to_owned(),
+        None => "not white".to_owned(),
+    });
     if found.is_coloured_noise(&found.after, tests) && !tests.white {
         parts.push(
             "coloured noise: the floor is that of white noise, and no effect explains a significant part of the rest"

@@ -143,7 +143,8 @@ pub fn response(
 pub fn autocorrelation(residuals: &[RecordResidual], lags: usize) -> (Vec<f64>, f64) {
     let counts = residuals.iter().map(|r| r.samples.len());
     let lags = lags.min(counts.clone().min().unwrap_or(0).saturating_sub(1));
-    let sums = autocorrelations(residuals.iter(), lags);
+    let samples: Vec<&[f64]> = residuals.iter().map(|r| &r.samples[..]).collect();
+    let sums = autocorrelations(&samples, lags);
     let whole = sums[0].max(f64::MIN_POSITIVE);
     let shares = sums.iter().map(|s| s / whole).collect();
     let total: usize = counts.sum();

@@ -16,6 +16,8 @@ use torqcomp_dsp::dot;
 const LAGS: usize = 25;
 /// Confidence level of these tests.
 const CONFIDENCE: f64 = 0.99;
+/// Range of the correlation between neighbouring samples of first-order noise.
+const FIRST_ORDER: std::ops::Range<f64> = 0.05..0.95;
 /// Number of lags over which autocorrelations count, and their largest fraction of a record.
 const COLOUR_LAGS: usize = 400;
 const COLOUR_PART: usize = 4;
@@ -50,6 +52,8 @@ pub struct ResidualTests {
     pub white: bool,
     /// Sum of the squared autocorrelation over the 99 % bound for white noise; `null` if the record is too short.
     pub whiteness_ratio: Option<f64>,
+    /// Correlation of neighbouring samples, if the residual is white once that is removed: first-order noise.
+    pub first_order_noise: Option<f64>,
     /// Whether the cross-correlation with the input, at positive and negative lags, stays within 99 % bounds.
     pub independent_of_input: bool,
     /// Lag of the largest cross-correlation in samples; negative: the residual leads the input.
@@ -75,13 +79,15 @@ pub struct ResidualTests {
 impl ResidualTests {
     /// Tests the residuals of records of a stand with that mode.
     pub fn of(residuals: &[RecordResidual], mode: &Mode) -> Self {
-        let (white, whiteness_ratio) = whiteness(residuals);
+        let all: Vec<&[f64]> = residuals.iter().map(|r| &r.samples[..]).collect();
+        let (white, whiteness_ratio) = whiteness(&all, 0);
         let in_largest_hundredth = in_largest_hundredth(residuals);
         let has_spikes = in_largest_hundredth > SPIKES;
         let (independent_of_input, largest_lag) = input_independence(residuals);
         Self {
             white,
             whiteness_ratio,
+            first_order_noise: (!white).then(|| first_order_noise(&all)).flatten(),
             independent_of_input,
             largest_lag,
             in_largest_hundredth,
@@ -99,6 +105,11 @@ impl ResidualTests {
     pub fn dependence(&self) -> Option<&PowerShare> {
         let shares = self.shares.iter().filter(|s| s.exceeds(DEPENDENT));
         shares.max_by(|a, b| a.share.total_cmp(&b.share))
+    }
+
+    /// Whether the spectrum is that of white or first-order noise.
+    pub fn has_spectrum_of_noise(&self) -> bool {
+        self.white || self.first_order_noise.is_some()
     }
 
     /// Whether they show white noise only.
@@ -171,32 +182,40 @@ pub fn autocorrelation(values: &[f64], lags: usize) -> Vec<f64> {
 }
 
 /// Sums of products at lags from 0, over several residuals.
-pub fn autocorrelations<'a>(
-    residuals: impl Iterator<Item = &'a RecordResidual>,
-    lags: usize,
-) -> Vec<f64> {
+pub fn autocorrelations(residuals: &[&[f64]], lags: usize) -> Vec<f64> {
     let mut sums = vec![0.0; lags + 1];
     for residual in residuals {
-        let own = autocorrelation(&residual.samples, lags);
+        let own = autocorrelation(residual, lags);
         sums.iter_mut().zip(own).for_each(|(sum, r)| *sum += r);
     }
     sums
 }
 
-fn total(residuals: &[RecordResidual]) -> f64 {
-    residuals.iter().map(|r| r.samples.len()).sum::<usize>() as f64
-}
-
-/// The portmanteau test over the first lags (G. E. P. Box, D. A. Pierce, J. Am. Stat. Assoc. 65 (1970), 1509).
-fn whiteness(residuals: &[RecordResidual]) -> (bool, Option<f64>) {
-    let sums = autocorrelations(residuals.iter(), LAGS);
+/// The portmanteau test over the first lags (G. E. P. Box, D. A. Pierce, J. Am. Stat. Assoc. 65 (1970), 1509), for
+/// residuals of a model of the noise with a number of parameters.
+fn whiteness(residuals: &[&[f64]], parameters: usize) -> (bool, Option<f64>) {
+    let sums = autocorrelations(residuals, LAGS);
     if sums[0] <= 0.0 {
         return (true, None);
     }
-    let q = total(residuals) * sums[1..].iter().map(|r| (r / sums[0]).powi(2)).sum::<f64>();
-    let bound =
-        ChiSquared::new(LAGS as f64).map_or(f64::INFINITY, |law| law.inverse_cdf(CONFIDENCE));
+    let count = residuals.iter().map(|r| r.len()).sum::<usize>() as f64;
+    let q = count * sums[1..].iter().map(|r| (r / sums[0]).powi(2)).sum::<f64>();
+    let law = ChiSquared::new((LAGS - parameters) as f64);
+    let bound = law.map_or(f64::INFINITY, |law| law.inverse_cdf(CONFIDENCE));
     (q <= bound, Some(q / bound))
+}
+
+/// The correlation `ρ` of neighbouring samples, if `r[n] − ρ r[n−1]` is white.
+fn first_order_noise(residuals: &[&[f64]]) -> Option<f64> {
+    let sums = autocorrelations(residuals, 1);
+    let correlation = sums[1] / sums[0].max(1e-300);
+    if !FIRST_ORDER.contains(&correlation) {
+        return None;
+    }
+    let without = |r: &&[f64]| r.windows(2).map(|w| w[1] - correlation * w[0]).collect();
+    let left: Vec<Vec<f64>> = residuals.iter().map(without).collect();
+    let left: Vec<&[f64]> = left.iter().map(Vec::as_slice).collect();
+    whiteness(&left, 1).0.then_some(correlation)
 }
 
 /// Largest cross-correlation with the input against its bound, allowing for the autocorrelation of both

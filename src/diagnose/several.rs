@@ -254,7 +254,7 @@ impl SearchState {
         if floor.is_some_and(NoiseFloor::is_rounding) {
             return remains(model, tests, floor);
         }
-        let is_noise = tests.white && tests.independent_of_input;
+        let is_noise = tests.has_spectrum_of_noise() && tests.independent_of_input;
         let of_periods = floor.filter(|floor| floor.from == NoiseFloorSource::Periods);
         let is_at_floor =
             of_periods.is_some_and(|floor| model.compared_rms() <= ALL_NOISE * floor.rms);

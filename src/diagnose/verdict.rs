@@ -190,7 +190,7 @@ pub fn noise_rms(floor: Option<NoiseFloor>) -> f64 {
 
 /// Whether something above the noise is left. A noise level from differences between periods decides alone; one from
 /// out of band may be too low for coloured noise, so the residual must also depend on input or motion, or be far above
-/// it.
+/// it with another spectrum than first-order noise.
 pub fn remains(model: &ScoredModel, tests: &ResidualTests, floor: Option<NoiseFloor>) -> bool {
     if tests.has_spikes() {
         // Spikes also raise a floor measured without a model.
@@ -203,7 +203,9 @@ pub fn remains(model: &ScoredModel, tests: &ResidualTests, floor: Option<NoiseFl
     let ratio = model.compared_rms() / model.with_uncertain(floor);
     let is_enough = match floor.from {
         NoiseFloorSource::Periods | NoiseFloorSource::Resolution => true,
-        NoiseFloorSource::OutOfBand => is_dependent || ratio > FAR_ABOVE && !tests.white,
+        NoiseFloorSource::OutOfBand => {
+            is_dependent || ratio > FAR_ABOVE && !tests.has_spectrum_of_noise()
+        }
     };
     ratio > AT_FLOOR && is_enough
 }
