@@ -18,6 +18,9 @@ use crate::check::{non_negative, positive};
 use crate::error::ModelError;
 use crate::mode::Mode;
 
+/// Smallest factor on the stiffness with which a stand is simulated.
+const LEAST_STIFFNESS: f64 = 0.05;
+
 /// Contribution of one mode to the response of a stand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModalPart {
@@ -33,6 +36,18 @@ pub struct ModalPart {
 }
 
 impl ModalPart {
+    /// The same for a torque at the gage: without a quadrature, unless that is where the load acts.
+    pub(crate) fn of_torque(&self) -> Self {
+        Self {
+            residue: self.at_gage.unwrap_or(0.0),
+            quadrature: match self.at_gage == Some(self.residue) {
+                true => self.quadrature,
+                false => 0.0,
+            },
+            ..*self
+        }
+    }
+
     /// `(r + q jω/ω_k)/(1 − (ω/ω_k)² + 2jζ ω/ω_k)`, where `inverse` is the denominator.
     fn over(&self, omega_rad_s: f64, inverse: Complex64) -> Complex64 {
         let w = omega_rad_s / self.mode.omega_rad_s;
@@ -98,6 +113,65 @@ impl ModalResponse {
         Ok(Self {
             residual: 1.0 - parts.iter().map(|part| part.residue).sum::<f64>(),
             parts,
+        })
+    }
+
+    /// The response of an inertia `J₁` on a spring to a torque on it, with a second inertia `J₂ = μ J₁` attached to it by
+    /// a spring and a damper; `None` if one of the modes does not ring. With `x₂` for the second inertia,
+    ///
+    /// ```text
+    /// x₁'' + 2ζ₁ω₁ x₁' + ω₁² x₁ = ω₁² u + μ a,   x₂'' = −a,   a = 2ζ₂ω₂ (x₂' − x₁') + ω₂² (x₂ − x₁)
+    /// ```
+    ///
+    /// has [two modes](Mode::coupled_to), with residues `ω₁² (p² + 2ζ₂ω₂ p + ω₂²)/D'(p)` at the roots `p` of `D(s) = (s² +
+    /// 2ζ₁ω₁ s + ω₁²)(s² + 2ζ₂ω₂ s + ω₂²) + μ s² (2ζ₂ω₂ s + ω₂²)`. The part with the larger residue comes first.
+    ///
+    /// ```
+    /// use torqcomp_model::{ModalResponse, Mode};
+    /// let mode = |omega_rad_s| Mode { omega_rad_s, damping_ratio: 0.0 };
+    /// // s⁴ + (1 + 4 + μ 4) s² + 4 with μ = 2.25 has the roots s² = −7 ± √45.
+    /// let stand = ModalResponse::of_two_inertias(mode(1.0), mode(2.0), 2.25).unwrap();
+    /// let slow = stand.parts()[0];
+    /// assert!((slow.mode.omega_rad_s.powi(2) - (7.0 - 45f64.sqrt())).abs() < 1e-12);
+    /// // r = (4 − ω²)/(ω² (ω₂² − ω²)).
+    /// let own = 7.0 - 45f64.sqrt();
+    /// assert!((slow.residue - (4.0 - own) / (own * 2.0 * 45f64.sqrt())).abs() < 1e-12);
+    /// ```
+    #[must_use]
+    pub fn of_two_inertias(first: Mode, second: Mode, ratio: f64) -> Option<Self> {
+        // In units of ω₁.
+        let rho = second.omega_rad_s / first.omega_rad_s;
+        let (loss, spring) = (2.0 * second.damping_ratio * rho, rho * rho);
+        let own_loss = 2.0 * first.damping_ratio;
+        let part = |mode: Mode| {
+            let size = mode.omega_rad_s / first.omega_rad_s;
+            let swing = (1.0 - mode.damping_ratio.powi(2)).sqrt();
+            let p = size * Complex64::new(-mode.damping_ratio, swing);
+            let own = p * p + own_loss * p + 1.0;
+            let hung = p * p + loss * p + spring;
+            let slope = (2.0 * p + own_loss) * hung
+                + own * (2.0 * p + loss)
+                + ratio * p * (3.0 * loss * p + 2.0 * spring);
+            let share = hung / slope;
+            // R/(s − p) and its conjugate: (2 Re R s − 2 Re(R p*))/(s² − 2 Re p s + |p|²).
+            let residue = -2.0 * (share * p.conj()).re / (size * size);
+            ModalPart {
+                mode,
+                residue,
+                quadrature: 2.0 * share.re / size,
+                at_gage: Some(residue),
+            }
+        };
+        let modes = first.coupled_to(&second, ratio);
+        if modes.len() != 2 || modes.iter().any(|mode| mode.damping_ratio >= 1.0) {
+            return None;
+        }
+        let mut parts: Vec<ModalPart> = modes.into_iter().map(part).collect();
+        parts.sort_by(|a, b| b.residue.total_cmp(&a.residue));
+        let stand = Self::new(parts).ok()?;
+        Some(Self {
+            residual: 0.0,
+            ..stand
         })
     }
 
@@ -176,18 +250,46 @@ impl ModalResponse {
     }
 
     /// Response of the gage to a torque at the gage, at `s = jω`, normalised to its static value; `None` if the
-    /// contributions of the modes to it are unknown. For a stand with one mode it is the stand's response.
+    /// contributions of the modes to it are unknown. It is the stand's response if the torque acts where the load does.
     #[must_use]
     pub fn at_gage(&self) -> Option<Self> {
+        let acts_there = |part: &ModalPart| part.at_gage == Some(part.residue);
+        if self.parts.iter().all(acts_there) {
+            return Some(self.clone());
+        }
+        let part = |part: &ModalPart| part.at_gage.map(|_| part.of_torque());
+        let parts: Option<Vec<ModalPart>> = self.parts.iter().map(part).collect();
+        Self::new(parts?).ok()
+    }
+
+    /// The stand with another dynamic stiffness `κ K` in each mode, as it is at the natural frequency: `ω √Re κ`,
+    /// `ζ/√Re κ + Im κ/(2 Re κ)`, and a displacement of `1/Re κ` times that under the same torque. `None` if a mode would
+    /// not be stable.
+    pub(crate) fn stiffened(
+        &self,
+        change: impl Fn(&Mode, f64, Complex64) -> Complex64,
+    ) -> Option<Self> {
         let part = |part: &ModalPart| {
-            Some(ModalPart {
-                residue: part.at_gage?,
-                quadrature: 0.0,
-                ..*part
+            let omega = part.mode.omega_rad_s;
+            let plain = part.mode.inverse(omega);
+            let factor = 1.0 + change(&part.mode, omega, plain) - plain;
+            let damping_ratio =
+                part.mode.damping_ratio / factor.re.sqrt() + 0.5 * factor.im / factor.re;
+            (factor.re > LEAST_STIFFNESS && damping_ratio >= 0.0).then(|| ModalPart {
+                mode: Mode {
+                    omega_rad_s: omega * factor.re.sqrt(),
+                    damping_ratio,
+                },
+                residue: part.residue / factor.re,
+                quadrature: part.quadrature / factor.re,
+                at_gage: part.at_gage.map(|at_gage| at_gage / factor.re),
             })
         };
         let parts: Option<Vec<ModalPart>> = self.parts.iter().map(part).collect();
-        Self::new(parts?).ok()
+        Some(Self {
+            parts: parts?,
+            residual: self.residual,
+        })
     }
 }
 

@@ -8,8 +8,8 @@ use super::{Chain, Link};
 use crate::effects::{Action, SampleClock, Stage, Zero};
 use crate::mode::Mode;
 use crate::simulate::{
-    Between, Excitation, MotionProgress, MotionState, OngoingMotion, Torques, free_motion,
-    held_response, integrate,
+    Excitation, MotionProgress, MotionState, OngoingMotion, Torques, free_motion, integrate,
+    sampled_response,
 };
 
 /// A record on its way through the chain, in the domain in which the last link left it.
@@ -268,17 +268,16 @@ impl Chain {
 
     fn respond(&self, input: &Excitation) -> Signal {
         let lines = input.spectrum().iter().enumerate();
-        let spectrum = match input.between() {
-            Between::Held => {
-                let held = held_response(&self.stand, 1.0 / input.rate_hz());
-                let motion = |k| input.line_of_samples(k) * self.gain * held(input.omega_rad_s(k));
-                lines.map(|(k, _)| motion(k)).collect()
-            }
-            _ => {
-                let response = |k| self.stand.response(input.omega_rad_s(k));
-                lines.map(|(k, u)| u * self.gain * response(k)).collect()
-            }
+        let sampled = sampled_response(&self.stand, 1.0 / input.rate_hz(), input.between());
+        let motion = |(k, u): (usize, &Complex64)| {
+            let omega = input.omega_rad_s(k);
+            self.gain
+                * match &sampled {
+                    Some(response) => input.line_of_samples(k) * response(omega),
+                    None => u * self.stand.response(omega),
+                }
         };
+        let spectrum = lines.map(motion).collect();
         Signal::Spectrum(spectrum)
     }
 
@@ -292,9 +291,11 @@ impl Chain {
 
     fn apply(&self, action: &Action, signal: Signal, input: &Excitation) -> Signal {
         match action {
-            Action::Factor(_) | Action::Stiffness(_) => multiply(signal, input, |omega| {
-                action.factor(&self.stand, omega).unwrap_or(Complex64::ONE)
-            }),
+            Action::Factor(_) | Action::Stiffness(_) | Action::Body { .. } => {
+                multiply(signal, input, |omega| {
+                    action.factor(&self.stand, omega).unwrap_or(Complex64::ONE)
+                })
+            }
             Action::Feedthrough(past) => {
                 let mut spectrum = signal.into_spectrum(input);
                 for (k, (y, u)) in spectrum.iter_mut().zip(input.spectrum()).enumerate() {

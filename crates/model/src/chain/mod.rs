@@ -13,6 +13,7 @@
 mod forward;
 mod gage_path;
 mod slow_loads;
+mod within;
 
 use std::f64::consts::TAU;
 
@@ -103,6 +104,7 @@ impl Link {
             self.action,
             Action::Factor(_)
                 | Action::Stiffness(_)
+                | Action::Body { .. }
                 | Action::Feedthrough(_)
                 | Action::Recorder { .. }
         )
@@ -183,12 +185,16 @@ impl Chain {
         self
     }
 
-    /// Adds links; those of one stage keep the given order.
+    /// Adds links; those of one stage keep the given order. With torques, links that change how the stand moves become
+    /// part of the motion on which these act (`within`).
     #[must_use]
     pub fn with_links(mut self, links: impl IntoIterator<Item = Link>) -> Self {
         self.links.extend(links);
         self.links.sort_by_key(|link| link.stage);
-        self
+        match self.has_torques() {
+            true => self.with_links_within(),
+            false => self,
+        }
     }
 
     /// The links in order from torque to record.

@@ -30,6 +30,9 @@ pub struct PastStand {
 /// `1 − (ω/ω₀)² + 2jζ ω/ω₀`.
 pub type StiffnessChange = Box<dyn Fn(&Mode, f64, Complex64) -> Complex64 + Send + Sync>;
 
+/// A plain stand with a body coupled to it, as a sum of modes.
+pub type CoupledStand = Box<dyn Fn(&ModalResponse) -> Option<ModalResponse> + Send + Sync>;
+
 /// A known response that is not fitted, such as that of the recorder, as a function of frequency in
 /// Hz.
 pub type Fixed = Arc<dyn Fn(f64) -> Complex64 + Send + Sync>;
@@ -73,6 +76,13 @@ pub enum Action {
     Factor(Frequency),
     /// A change of the stiffness, which also changes how the stand rings.
     Stiffness(StiffnessChange),
+    /// A body coupled to the stand: a factor of the response, and a part of the motion on which torques act.
+    Body {
+        /// The factor.
+        factor: Frequency,
+        /// The stand with the body as a sum of modes; `None` if it does not ring.
+        coupled: CoupledStand,
+    },
     /// A term of the response past the stand: the applied quantity couples directly into the
     /// record.
     Feedthrough(PastStand),
@@ -239,7 +249,7 @@ impl Action {
     #[must_use]
     pub fn factor(&self, stand: &ModalResponse, omega_rad_s: f64) -> Option<Complex64> {
         match self {
-            Self::Factor(factor) => Some(factor(stand, omega_rad_s)),
+            Self::Factor(factor) | Self::Body { factor, .. } => Some(factor(stand, omega_rad_s)),
             Self::Stiffness(change) => {
                 let changed = |mode: &Mode, plain| change(mode, omega_rad_s, plain);
                 Some(stand.inverse(omega_rad_s) / stand.inverse_with(omega_rad_s, changed))
@@ -252,9 +262,11 @@ impl Action {
     #[must_use]
     pub fn treatment(&self) -> Treatment {
         match self {
-            Self::Factor(_) | Self::Stiffness(_) | Self::Feedthrough(_) | Self::Recorder { .. } => {
-                Treatment::DividedOut
-            }
+            Self::Factor(_)
+            | Self::Stiffness(_)
+            | Self::Body { .. }
+            | Self::Feedthrough(_)
+            | Self::Recorder { .. } => Treatment::DividedOut,
             Self::Lines(_) | Self::Spikes(_) | Self::Course(_) => Treatment::Subtracted,
             Self::Distortion(distortion) => distortion.treatment(),
             Self::Torque { torque, .. } if torque.begin(1.0) == [0.0; 2] => Treatment::Inverted,
@@ -269,6 +281,7 @@ impl std::fmt::Debug for Action {
             Self::Torque { .. } => "Torque",
             Self::Factor(_) => "Factor",
             Self::Stiffness(_) => "Stiffness",
+            Self::Body { .. } => "Body",
             Self::Feedthrough(_) => "Feedthrough",
             Self::Recorder { .. } => "Recorder",
             Self::Distortion(_) => "Distortion",

@@ -33,6 +33,8 @@ pub enum History {
     Unseen,
     /// It decays, at a corner in Hz.
     Fades,
+    /// It relaxes at all rates, far more slowly than the stand rings.
+    Lingers,
     /// It rings, with a natural frequency in Hz and the damping ratio that is the next parameter.
     Rings,
     /// It rings in both modes of the stand coupled to an inertia, with that inertia's frequency in Hz, the damping ratio
@@ -155,7 +157,7 @@ impl EffectParameter {
             damping_ratio: values[1],
         };
         match self.history {
-            History::Unseen | History::Fades => Vec::new(),
+            History::Unseen | History::Fades | History::Lingers => Vec::new(),
             History::Rings => vec![own()],
             History::RingsCoupled => first.coupled_to(&own(), values[2]),
         }

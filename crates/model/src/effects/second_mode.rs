@@ -103,14 +103,19 @@ pub(super) static EFFECT: Effect = Effect {
             starts: starts!(0.02),
             build: |p| {
                 let (second, ratio) = (mode(p[0], p[1]), p[2]);
-                factor(move |first, omega| {
-                    // J₂ is attached to J₁: (s² + …)₁ x + μ s² (2ζ₂ω₂ s + ω₂²)/(s² + …)₂ x = ω₁² u.
-                    let w1 = omega / first.first().omega_rad_s;
-                    let hung = second.inverse(omega) + (omega / second.omega_rad_s).powi(2);
-                    let load = -ratio * w1 * w1 * hung * second.response(omega);
-                    let plain = first.inverse(omega);
-                    plain / (plain + load)
-                })
+                Action::Body {
+                    factor: Box::new(move |first, omega| {
+                        // J₂ is attached to J₁: (s² + …)₁ x + μ s² (2ζ₂ω₂ s + ω₂²)/(s² + …)₂ x = ω₁² u.
+                        let w1 = omega / first.first().omega_rad_s;
+                        let hung = second.inverse(omega) + (omega / second.omega_rad_s).powi(2);
+                        let load = -ratio * w1 * w1 * hung * second.response(omega);
+                        let plain = first.inverse(omega);
+                        plain / (plain + load)
+                    }),
+                    coupled: Box::new(move |stand| {
+                        ModalResponse::of_two_inertias(stand.only()?, second, ratio)
+                    }),
+                }
             },
         },
         Form {

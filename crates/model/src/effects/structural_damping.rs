@@ -5,8 +5,11 @@
 //! `K (jω/ω₀)^α`, is causal; A. Gemant, Physics 7 (1936), 311), which shows only at the very start of a transient.
 //! Mistaken for viscous damping where only the resonance is excited, `coulomb-friction` at one level.
 
-use super::{Action, Effect, EffectParameter, Form, Mode, Stage};
+use super::{Action, Effect, EffectParameter, Form, History, Mode, Stage};
 use num_complex::Complex64;
+
+/// A springpot remembers the load before a record, as `t^(−α)`.
+const ORDER: EffectParameter = EffectParameter::number("order", 0.0, 0.5).showing(History::Lingers);
 
 pub(super) static EFFECT: Effect = Effect {
     name: "structural-damping",
@@ -37,7 +40,7 @@ pub(super) static EFFECT: Effect = Effect {
             name: "springpot",
             law: "K (j w/w_0)^alpha",
             stage: Stage::Dynamics,
-            parameters: &[EffectParameter::number("order", 0.0, 0.5)],
+            parameters: &[ORDER],
             starts: &[&[0.02]],
             build: |p| {
                 let order = p[0];
@@ -54,10 +57,7 @@ pub(super) static EFFECT: Effect = Effect {
             name: "springpot-stiffness",
             law: "r K (j w/w_0)^alpha",
             stage: Stage::Dynamics,
-            parameters: &[
-                EffectParameter::number("order", 0.0, 0.5),
-                EffectParameter::number("stiffness_ratio", 0.3, 3.0),
-            ],
+            parameters: &[ORDER, EffectParameter::number("stiffness_ratio", 0.3, 3.0)],
             starts: &[&[0.02, 1.0]],
             build: |p| {
                 let (order, ratio) = (p[0], p[1]);

@@ -36,8 +36,7 @@ impl Between {
 
     /// Factor of a line of the samples' spectrum, by its frequency in cycles per sample, `ν = f/f_s ≤ 1/2`: 1,
     /// `sinc² ν` or `e^{−jπν} sinc ν`, with `sinc ν = sin(πν)/(πν)`. The images above the Nyquist frequency are
-    /// left out; for a held input, the stand's response to them is included in its motion by the exact step
-    /// response.
+    /// left out; the stand's response to them is included in its motion, which is exact for steps and straight lines.
     ///
     /// ```
     /// use torqcomp_model::simulate::Between;

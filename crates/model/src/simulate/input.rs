@@ -79,8 +79,8 @@ impl Excitation {
             *value *= between.factor(line as f64 / self.total as f64);
         }
         let fine = match between {
-            Between::Held => self.staircase(substeps),
-            _ => self.refine(&spectrum, substeps),
+            Between::BandLimited => self.refine(&spectrum, substeps),
+            Between::StraightLines | Between::Held => self.polygon(substeps, between),
         };
         Self {
             samples: self.samples.clone(),
@@ -198,14 +198,25 @@ impl Excitation {
             .collect()
     }
 
-    /// The input with each sample held until the next.
-    fn staircase(&self, substeps: usize) -> Vec<f64> {
+    /// The input with each sample held until the next, or joined to it by a straight line.
+    fn polygon(&self, substeps: usize, between: Between) -> Vec<f64> {
         let count = self.samples.len();
-        let at = |node: usize| match (node.checked_sub(1), self.lead) {
-            (None, 0) => self.samples[count - 1],
-            (None, _) => self.samples[0],
-            (Some(node), 0) => self.samples[node / substeps % count],
-            (Some(node), _) => self.samples[(node / substeps).min(count - 1)],
+        let sample = |k: usize| match self.lead {
+            0 => self.samples[k % count],
+            _ => self.samples[k.min(count - 1)],
+        };
+        let at = |node: usize| {
+            // From one step before the first sample, which repeats if the record is periodic.
+            let node = match (node.checked_sub(1), self.lead) {
+                (Some(node), _) => node,
+                (None, 0) => count * substeps - 1,
+                (None, _) => 0,
+            };
+            let (from, part) = (node / substeps, (node % substeps) as f64 / substeps as f64);
+            match between {
+                Between::Held => sample(from),
+                _ => sample(from) + part * (sample(from + 1) - sample(from)),
+            }
         };
         (0..self.nodes(substeps)).map(at).collect()
     }

@@ -1,7 +1,7 @@
 //! Time integration of `x'' + 2ζω₀ x' + ω₀² (x + n(x, x', z)) = ω₀² G u`.
 //!
-//! The linear part is exact: from node to node by the matrix exponential, with the input between nodes as a cubic
-//! through four of them. The torques `n` act at the nodes (`run`; `modes` for several modes), each for a whole step
+//! The linear part is exact: from node to node by the matrix exponential, with the input between nodes constant, straight,
+//! or as a cubic through four of them. The torques `n` act at the nodes (`run`; `modes` for several modes), each for a whole step
 //! (Strang splitting, SIAM J. Numer. Anal. 5 (1968), 506): second order in the step, stable for linear terms of any
 //! size, and a switching torque follows its own exact flow.
 
@@ -123,14 +123,24 @@ impl LinearStep {
             is_held: between == Between::Held,
             of_input: [[0.0; 2]; 4],
         };
-        if step.is_held {
-            step.of_input[1] = step.held(gain);
+        let weights = match between {
+            Between::BandLimited => cubic,
+            Between::StraightLines => straight,
+            Between::Held => {
+                step.of_input[1] = step.held(gain);
+                return step;
+            }
+        };
+        if between == Between::StraightLines && mode.omega_rad_s * step_s > LARGEST_STEP {
+            let (held, ramp) = (step.held(gain), step.ramp(mode, gain, step_s));
+            step.of_input[1] = [held[0] - ramp[0], held[1] - ramp[1]];
+            step.of_input[2] = ramp;
             return step;
         }
         for (place, weight) in GAUSS {
             let [_, x, _, speed] = free(mode, (1.0 - place) * step_s);
             let force = weight * step_s * gain * mode.omega_rad_s * mode.omega_rad_s;
-            for ([to_x, to_speed], share) in step.of_input.iter_mut().zip(cubic(place)) {
+            for ([to_x, to_speed], share) in step.of_input.iter_mut().zip(weights(place)) {
                 *to_x += force * x * share;
                 *to_speed += force * speed * share;
             }
@@ -152,6 +162,18 @@ impl LinearStep {
     pub(super) fn held(&self, force: f64) -> [f64; 2] {
         let [a, c] = self.of_x;
         [force * (1.0 - a), -force * c]
+    }
+
+    /// What a force that rises from zero over the step adds to `x` and `x'`: the distance to the steady ramp `t/h −
+    /// 2ζ/(ω₀h)` decays like the free motion.
+    fn ramp(&self, mode: &Mode, force: f64, step_s: f64) -> [f64; 2] {
+        let (late, speed) = (
+            2.0 * mode.damping_ratio / (mode.omega_rad_s * step_s),
+            1.0 / step_s,
+        );
+        let [[a, c], [b, d]] = [self.of_x, self.of_speed];
+        let x = 1.0 - late + a * late - b * speed;
+        [force * x, force * (speed + c * late - d * speed)]
     }
 
     /// The state at the next node; both numbers in the same operations, which a processor does at once.
@@ -180,25 +202,37 @@ impl LinearStep {
     }
 }
 
-/// Response of the sampled motion to a held input, at an angular frequency in rad/s up to the Nyquist frequency,
-/// including the images of the steps above it. With the free motion `A` over a sample and the step response
-/// `B = (1 − A) (1, 0)` of displacement and speed, that of each mode is `(z − A)⁻¹ B` at `z = e^{jωT}`.
-pub(crate) fn held_response(stand: &ModalResponse, step_s: f64) -> impl Fn(f64) -> Complex64 {
-    let parts = stand.parts().iter();
-    let parts: Vec<_> = parts
-        .map(|part| (*part, free(&part.mode, step_s)))
-        .collect();
+/// Response of the sampled motion to an input that is held or straight between its samples, at an angular frequency in
+/// rad/s up to the Nyquist frequency, including the images above it; `None` for a band-limited one. With the free motion
+/// `A` over a sample, and the motion `B₀` and `B₁` due to a unit sample at its start and its end, that of each mode is
+/// `(z − A)⁻¹ (B₀ + z B₁)` at `z = e^{jωT}`.
+pub(crate) fn sampled_response(
+    stand: &ModalResponse,
+    step_s: f64,
+    between: Between,
+) -> Option<impl Fn(f64) -> Complex64> {
+    let step = |part: &ModalPart| (*part, LinearStep::new(&part.mode, 1.0, step_s, between));
+    let steps: Vec<_> = stand.parts().iter().map(step).collect();
     let residual = stand.residual();
-    move |omega| {
+    let response = move |omega| {
         let z = Complex64::from_polar(1.0, omega * step_s);
-        let of_part = |(part, [a, b, c, d]): &(ModalPart, [f64; 4])| {
+        let of_part = |(part, step): &(ModalPart, LinearStep)| {
+            let [[a, c], [b, d]] = [step.of_x, step.of_speed];
+            let [_, now, next, _] = step.of_input;
+            let [to_x, to_speed] = [0, 1].map(|k| now[k] + z * next[k]);
             let determinant = (z - a) * (z - d) - b * c;
-            let x = (z - d) * (1.0 - a) - b * c;
-            let speed = c * (1.0 - a) - (z - a) * c;
+            let x = (z - d) * to_x + b * to_speed;
+            let speed = c * to_x + (z - a) * to_speed;
             (part.residue * x + part.quadrature / part.mode.omega_rad_s * speed) / determinant
         };
-        parts.iter().map(of_part).sum::<Complex64>() + residual
-    }
+        steps.iter().map(of_part).sum::<Complex64>() + residual
+    };
+    (between != Between::BandLimited).then_some(response)
+}
+
+/// Weights of the nodes −1, 0, 1, 2 in a straight line between the middle ones.
+fn straight(t: f64) -> [f64; 4] {
+    [0.0, 1.0 - t, t, 0.0]
 }
 
 /// Weights of the nodes −1, 0, 1, 2 in their interpolating cubic, at a position between 0 and 1.

@@ -20,7 +20,7 @@ mod steady;
 pub use between::Between;
 pub use input::Excitation;
 pub use integrate::{MotionState, substeps};
-pub(crate) use integrate::{free_motion, held_response};
+pub(crate) use integrate::{free_motion, sampled_response};
 pub use pieces::{Diverges, Pieces};
 pub(crate) use run::{MotionProgress, Torques};
 pub(crate) use side_by_side::{OngoingMotion, integrate};

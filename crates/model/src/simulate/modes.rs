@@ -41,10 +41,10 @@ pub(super) fn begin(stand: &ModalResponse, start: MotionState) -> Vec<MotionStat
 /// A mode with its integration step.
 struct SteppedMode {
     step: LinearStep,
-    /// `g`; 0 where no torque acts.
-    at_gage: f64,
-    /// `ω² g/Σ ω² g`: the change of its speed when a torque changes that of the gage by 1.
-    pushed_by: f64,
+    /// The response to a torque at the gage, with residue `g`; 0 where no torque acts.
+    of_torque: ModalPart,
+    /// Its change when a torque changes the speed of the gage by 1: for the speed, `ω² g/Σ ω² g`.
+    pushed_by: MotionState,
     /// `v`, and `v'` without `q ω G u` and without the last change of the gage's speed.
     motion: MotionState,
 }
@@ -53,9 +53,15 @@ impl SteppedMode {
     /// The motion after the last change of the gage's speed.
     fn pushed(&self, change: f64) -> MotionState {
         MotionState {
-            x: self.motion.x,
-            speed: self.motion.speed + change * self.pushed_by,
+            x: self.motion.x + change * self.pushed_by.x,
+            speed: self.motion.speed + change * self.pushed_by.speed,
         }
+    }
+
+    /// What a torque that is constant over the step adds to the motion.
+    fn held(&self, torque: f64) -> MotionState {
+        let [x, speed] = self.step.held(torque);
+        at_gage(&self.of_torque, MotionState { x, speed })
     }
 }
 
@@ -87,31 +93,33 @@ impl<'a> Stepped<'a> for ModalIntegrator<'a> {
     ) -> (Self, MotionState) {
         let (gain, step_s) = (motion.gain, input.step_s());
         let stepped = |(part, at): (&ModalPart, &MotionState)| {
-            let share = part.at_gage.unwrap_or(0.0);
+            let of_torque = part.of_torque();
+            let blow = MotionState {
+                x: 0.0,
+                speed: part.mode.omega_rad_s.powi(2),
+            };
             SteppedMode {
                 step: LinearStep::new(&part.mode, gain, step_s, input.between()).at_gage(part),
-                at_gage: share,
-                pushed_by: part.mode.omega_rad_s.powi(2) * share,
+                of_torque,
+                pushed_by: at_gage(&of_torque, blow),
                 motion: *at,
             }
         };
         let parts = motion.stand.parts().iter();
         let mut modes: Vec<SteppedMode> = parts.zip(&motion.progress.modes).map(stepped).collect();
-        let acceleration: f64 = modes.iter().map(|mode| mode.pushed_by).sum();
+        let acceleration: f64 = modes.iter().map(|mode| mode.pushed_by.speed).sum();
         // Without a shape at the gage no torque acts.
         if acceleration != 0.0 {
-            modes
-                .iter_mut()
-                .for_each(|mode| mode.pushed_by /= acceleration);
+            for mode in &mut modes {
+                mode.pushed_by.x /= acceleration;
+                mode.pushed_by.speed /= acceleration;
+            }
         }
         let turned = |part: &ModalPart| part.quadrature * part.mode.omega_rad_s;
         let memories = motion.progress.memories.iter().copied();
         let run = Self {
             impulse: step_s * acceleration,
-            stops: modes
-                .iter()
-                .map(|mode| mode.step.held(mode.at_gage)[1])
-                .sum(),
+            stops: modes.iter().map(|mode| mode.held(1.0).speed).sum(),
             modes,
             direct: motion.stand.residual() * gain,
             direct_speed: gain * motion.stand.parts().iter().map(turned).sum::<f64>(),
@@ -182,11 +190,11 @@ impl ModalIntegrator<'_> {
         }
         let friction = (moved.speed / self.stops).clamp(-self.dry, self.dry);
         for mode in &mut self.modes {
-            let [x, speed] = mode.step.held(-mode.at_gage * friction);
-            mode.motion.x += x;
-            mode.motion.speed += speed;
-            moved.x += x;
-            moved.speed += speed;
+            let held = mode.held(-friction);
+            mode.motion.x += held.x;
+            mode.motion.speed += held.speed;
+            moved.x += held.x;
+            moved.speed += held.speed;
         }
         moved
     }

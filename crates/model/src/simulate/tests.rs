@@ -7,6 +7,8 @@ use crate::chain::{Chain, Link};
 use crate::effects::{Action, Effect, Mode, RIVALS, Stage};
 use crate::modal::{ModalPart, ModalResponse};
 
+mod within;
+
 pub(super) const RATE_HZ: f64 = 20_000.0;
 const COUNT: usize = 2000;
 pub(super) const MODE: Mode = Mode {
@@ -64,14 +66,13 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
     (sum / f64::from(count)).sqrt()
 }
 
-/// Classical fourth-order Runge–Kutta on `(x, x', z)` with steps of a 200th of a sample.
-fn oracle(rates: impl Fn(f64, [f64; 3]) -> [f64; 3]) -> Vec<f64> {
+/// Classical fourth-order Runge–Kutta on `(x, x', …)` with steps of a 200th of a sample.
+fn oracle<const N: usize>(rates: impl Fn(f64, [f64; N]) -> [f64; N]) -> Vec<f64> {
     const FINE: usize = 200;
     let h = 1.0 / (RATE_HZ * FINE as f64);
-    let mut state = [0.0; 3];
+    let mut state = [0.0; N];
     let mut samples = Vec::new();
-    let moved =
-        |s: [f64; 3], k: [f64; 3], h: f64| [s[0] + h * k[0], s[1] + h * k[1], s[2] + h * k[2]];
+    let moved = |s: [f64; N], k: [f64; N], h: f64| std::array::from_fn(|i| s[i] + h * k[i]);
     for step in 0..(COUNT - 1) * FINE + 1 {
         if step % FINE == 0 {
             samples.push(state[0]);
@@ -81,7 +82,7 @@ fn oracle(rates: impl Fn(f64, [f64; 3]) -> [f64; 3]) -> Vec<f64> {
         let b = rates(t + 0.5 * h, moved(state, a, 0.5 * h));
         let c = rates(t + 0.5 * h, moved(state, b, 0.5 * h));
         let d = rates(t + h, moved(state, c, h));
-        for i in 0..3 {
+        for i in 0..N {
             state[i] += h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]);
         }
     }
