@@ -14,10 +14,34 @@ const STEPS: usize = 16;
 /// Noise relative to the RMS of the record.
 const NOISE: f64 = 0.003;
 
+/// An inertia that hangs on the stand's own by a spring and a damper: its frequency and damping ratio alone, and its
+/// size relative to the stand's.
+#[derive(Clone, Copy)]
+pub struct Hung {
+    pub natural_hz: f64,
+    pub damping_ratio: f64,
+    pub inertia_ratio: f64,
+}
+
 /// Applied and recorded torque of a stand with a torque in N m, a function of time, displacement and speed divided by
 /// `ω`, in addition to a spring of 1, under forty sines; and the RMS of the noise.
 pub fn record(
     law: impl Fn(f64, f64, f64) -> f64,
+    excited: (f64, f64),
+    noise: &mut Noise,
+) -> (String, f64) {
+    let nothing = Hung {
+        natural_hz: 0.0,
+        damping_ratio: 0.0,
+        inertia_ratio: 0.0,
+    };
+    record_with(law, nothing, excited, noise)
+}
+
+/// The same with a second inertia.
+pub fn record_with(
+    law: impl Fn(f64, f64, f64) -> f64,
+    hung: Hung,
     (level, to_hz): (f64, f64),
     noise: &mut Noise,
 ) -> (String, f64) {
@@ -32,12 +56,15 @@ pub fn record(
         let lines = lines.iter();
         level * lines.map(|[w, phase]| (w * t + phase).sin()).sum::<f64>()
     };
-    let slope = |t: f64, [x, v]: [f64; 2]| {
+    let own = TAU * hung.natural_hz;
+    let slope = |t: f64, [x, v, y, w]: [f64; 4]| {
         let pull = torque(t) - x - law(t, x, v / omega);
-        [v, omega * omega * pull - 2.0 * DAMPING_RATIO * omega * v]
+        let back = own * own * (y - x) + 2.0 * hung.damping_ratio * own * (w - v);
+        let alone = omega * omega * pull - 2.0 * DAMPING_RATIO * omega * v;
+        [v, alone + hung.inertia_ratio * back, w, -back]
     };
     let h = 1.0 / (RATE_HZ * STEPS as f64);
-    let (mut state, mut motion) = ([0.0; 2], Vec::new());
+    let (mut state, mut motion) = ([0.0; 4], Vec::new());
     for i in 0..SAMPLES * STEPS {
         if i % STEPS == 0 {
             motion.push(state[0]);

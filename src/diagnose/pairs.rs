@@ -228,7 +228,13 @@ fn pairs(changes: &[Change], products: &Products, count: f64) -> Vec<EffectPair>
         }
     }
     sort_by_number(&mut found, |pair| pair.criterion);
-    let names = |pair: &EffectPair| pair.members.map(|k| changes[k].effect.effect.name);
+    // A body that moves with the stand differs from a second mode only in how torques act on it.
+    let names = |pair: &EffectPair| {
+        pair.members.map(|k| {
+            let effect = changes[k].effect;
+            (effect.effect.name, effect.is_body())
+        })
+    };
     let mut seen = Vec::new();
     found.retain(|pair| {
         let before = seen.iter().filter(|names_of| **names_of == names(pair));

@@ -247,8 +247,8 @@ impl SearchState {
         is_open && (self.is_worthwhile(after, &self.tests) || is_above(after, floor))
     }
 
-    /// Whether a model leaves enough for another effect: something above the noise, or a residual that is not just
-    /// noise and exceeds the differences between periods. A rounding error is neither white nor independent of the input.
+    /// Whether a model leaves enough for another effect: something above the noise, more of it in the training records, or
+    /// a residual that is not just noise and exceeds the differences between periods. A rounding error is neither white nor independent of the input.
     pub(super) fn is_worthwhile(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
         let floor = self.noise_floor;
         if floor.is_some_and(NoiseFloor::is_rounding) {
@@ -260,7 +260,9 @@ impl SearchState {
             of_periods.is_some_and(|floor| model.compared_rms() <= ALL_NOISE * floor.rms);
         // Anything not periodic with the input is part of that floor.
         let is_at_floor = is_at_floor && !tests.drifts() && self.lines_of(model).is_empty();
-        remains(model, tests, floor) || !is_noise && !is_at_floor
+        remains(model, tests, floor)
+            || !is_noise && !is_at_floor
+            || self.left_in_training(model).is_some()
     }
 
     /// Removes unnecessary effects. Known fits of the model without each of its effects are reused.

@@ -35,6 +35,10 @@ impl PlainStand {
 
 /// Minimum number of periods of a line in the longest record.
 const FEWEST_TURNS: f64 = 3.0;
+/// Number of decays that represent an algebraic one, of a material that remembers the load before the record, and the
+/// rate of the fastest, in units of the natural angular frequency; the slowest lasts as long as the record.
+const LINGERING: usize = 4;
+const FASTEST: f64 = 0.3;
 
 /// Context shared by all models of a diagnosis.
 #[derive(Clone)]
@@ -171,6 +175,12 @@ impl EffectForm {
             forms.map(move |form| Self { effect, form })
         };
         effects.into_iter().flat_map(forms).collect()
+    }
+
+    /// Whether it is a body coupled to the stand.
+    pub fn is_body(&self) -> bool {
+        let mut parameters = self.form.parameters.iter();
+        parameters.any(|p| p.history == History::RingsCoupled)
     }
 
     /// Number of parameters that a fit moves; amplitudes of lines follow by linear least squares.
@@ -350,6 +360,13 @@ impl Structure {
         self.placed().map(of_effect).collect()
     }
 
+    /// Rates of the decays of what a material remembers.
+    fn lingering(&self, mode: &Mode) -> impl Iterator<Item = f64> {
+        let fastest = FASTEST * mode.omega_rad_s;
+        let span = (fastest * self.context.scales.duration_s).max(1.0);
+        (0..LINGERING).map(move |k| fastest * span.powf(-(k as f64) / (LINGERING - 1) as f64))
+    }
+
     /// The model for parameter values, and its nuisance terms.
     pub fn model(&self, values: &[f64]) -> (Chain, NuisanceTerms) {
         let (mode, gain) = self.mode(values);
@@ -366,8 +383,10 @@ impl Structure {
         let mut links = Vec::new();
         for (effect, own) in self.effects.iter().zip(self.effect_values(values)) {
             for (k, parameter) in effect.form.parameters.iter().enumerate() {
-                if parameter.history == History::Fades {
-                    terms.decays_per_s.push(TAU * own[k]);
+                match parameter.history {
+                    History::Fades => terms.decays_per_s.push(TAU * own[k]),
+                    History::Lingers => terms.decays_per_s.extend(self.lingering(&mode)),
+                    _ => {}
                 }
                 terms.ringing.extend(parameter.ringing(&mode, &own[k..]));
             }

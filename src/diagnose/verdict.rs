@@ -50,9 +50,9 @@ const NAMED: f64 = 0.5;
 const CLEARLY_ABOVE: f64 = 1.05;
 /// Ratio of the error to the noise floor above which a remaining dependence on the input counts.
 const ABOVE: f64 = 1.005;
-/// Ratio of the plain stand's error to the noise in the training records, relative to that in the hold-out records,
-/// above which something acts in the training records only.
-const MORE_IN_TRAINING: f64 = 2.0;
+/// Ratio of a model's error to the noise in the training records, relative to that in the hold-out records, above which
+/// something acts in the training records only.
+const MORE_IN_TRAINING: f64 = 1.4;
 /// 95 % coverage factor for the error due to uncertain constants.
 const CERTAIN: f64 = 2.0;
 /// Minimum fraction of the initial excess error power that a further named effect must explain.
