@@ -115,7 +115,7 @@ impl Failure {
 
     /// A failure of the work caused by another error.
     pub fn of<E: fmt::Display>(code: ErrorCode) -> impl Fn(E) -> Self {
-        move |error| Self::failed(code, error)
+        move |error| code.failed(error)
     }
 
     /// A wrong command line.
@@ -127,16 +127,12 @@ impl Failure {
     pub fn writing(place: &str, error: &io::Error) -> Self {
         match error.kind() {
             io::ErrorKind::BrokenPipe => Self::ClosedPipe,
-            io::ErrorKind::StorageFull => Self::failed(
-                ErrorCode::DiskFull,
-                "no space left on the disk; free some space or write elsewhere with -o",
-            )
-            .at(place),
-            _ => Self::failed(
-                ErrorCode::CannotWrite,
-                format_args!("cannot be written: {error}"),
-            )
-            .at(place),
+            io::ErrorKind::StorageFull => ErrorCode::DiskFull
+                .failed("no space left on the disk; free some space or write elsewhere with -o")
+                .at(place),
+            _ => ErrorCode::CannotWrite
+                .failed(format_args!("cannot be written: {error}"))
+                .at(place),
         }
     }
 
@@ -146,7 +142,7 @@ impl Failure {
             io::ErrorKind::InvalidData => ErrorCode::DamagedFile,
             _ => ErrorCode::CannotRead,
         };
-        Self::failed(code, format_args!("cannot be read: {error}"))
+        code.failed(format_args!("cannot be read: {error}"))
     }
 
     /// A failure to read a file.
@@ -159,7 +155,8 @@ impl Failure {
             }
             _ => (ErrorCode::CannotRead, ""),
         };
-        Self::failed(code, format_args!("cannot be read: {error}{hint}")).at(path.shown())
+        code.failed(format_args!("cannot be read: {error}{hint}"))
+            .at(path.shown())
     }
 
     /// The exit code.
@@ -296,13 +293,13 @@ impl std::error::Error for Failure {}
 
 impl From<torqcomp_dsp::Error> for Failure {
     fn from(error: torqcomp_dsp::Error) -> Self {
-        Self::failed(ErrorCode::UnsuitableRecord, error)
+        ErrorCode::UnsuitableRecord.failed(error)
     }
 }
 
 impl From<torqcomp_model::fit::FitError> for Failure {
     fn from(error: torqcomp_model::fit::FitError) -> Self {
-        Self::failed(ErrorCode::NotIdentifiable, error)
+        ErrorCode::NotIdentifiable.failed(error)
     }
 }
 
@@ -326,10 +323,8 @@ mod tests {
 
     #[test]
     fn the_place_stands_before_the_message_and_the_hint_behind_it() {
-        let failure = Failure::failed(
-            ErrorCode::InvalidSample,
-            "the cell reads \"a; b\" (or c; d); correct it; or cut the record there",
-        );
+        let failure = ErrorCode::InvalidSample
+            .failed("the cell reads \"a; b\" (or c; d); correct it; or cut the record there");
         let failure = failure.line(3).at("a.csv").at("b.csv");
         assert_eq!(
             failure.to_string(),

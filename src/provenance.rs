@@ -83,8 +83,7 @@ fn date() -> Result<String, Failure> {
         Err(_) => None,
     };
     let seconds = seconds.ok_or_else(|| {
-        Failure::usage(
-            ErrorCode::InvalidValue,
+        ErrorCode::InvalidValue.usage(
             "the environment variable SOURCE_DATE_EPOCH is not a time; expected whole seconds since 1970",
         )
     })?;

@@ -56,10 +56,9 @@ impl NamedUnit {
                 text: text.to_owned(),
                 unit,
             }),
-            Err(error) => Err(Failure::usage(
-                ErrorCode::InvalidValue,
-                format_args!("{flag} {text}: {error}"),
-            )),
+            Err(error) => {
+                Err(ErrorCode::InvalidValue.usage(format_args!("{flag} {text}: {error}")))
+            }
         }
     }
 
@@ -95,13 +94,10 @@ impl RecordedChannel<'_> {
         let why = Unit::parse(text)
             .err()
             .map_or_else(String::new, |error| format!(": {error}"));
-        Failure::failed(
-            ErrorCode::UnitUnclear,
-            format_args!(
-                "the unit \"{text}\" of the channel \"{}\" is unknown{why}; {advice}",
-                self.name
-            ),
-        )
+        ErrorCode::UnitUnclear.failed(format_args!(
+            "the unit \"{text}\" of the channel \"{}\" is unknown{why}; {advice}",
+            self.name
+        ))
     }
 
     /// Failure for a unit between force and mass, such as oz-in, where a torque is expected.
@@ -116,14 +112,11 @@ impl RecordedChannel<'_> {
                 format!("if it is a torque, give --unit \"{force}\" (1 {force} = {size} N m)")
             },
         );
-        Some(Failure::failed(
-            ErrorCode::UnitUnclear,
-            format_args!(
+        Some(ErrorCode::UnitUnclear.failed(format_args!(
                 "the channel \"{}\" is in \"{text}\", which can be read with a force or with a mass; {torque}; \
                  \"{mass}\" cannot be converted to torque",
                 self.name
-            ),
-        ))
+            )))
     }
 }
 

@@ -102,8 +102,7 @@ impl Listing {
         is_ours: &dyn Fn(&Path) -> bool,
     ) -> Result<(), Failure> {
         if is_dash(input) {
-            return Err(Failure::usage(
-                ErrorCode::MissingArgument,
+            return Err(ErrorCode::MissingArgument.usage(
                 "standard input is one recording and has no name; name files, or give --files-from - for a list of \
                  paths",
             ));
@@ -142,11 +141,9 @@ impl Listing {
                 continue;
             }
             let path = file_name::path_of_bytes(line).ok_or_else(|| {
-                Failure::failed(
-                    ErrorCode::CannotRead,
-                    format_args!("path {} is not UTF-8; rename the file", i + 1),
-                )
-                .at(input.name())
+                ErrorCode::CannotRead
+                    .failed(format_args!("path {} is not UTF-8; rename the file", i + 1))
+                    .at(input.name())
             })?;
             self.push(&path, file_name::with_slashes(&path));
         }
@@ -176,18 +173,17 @@ impl Listing {
                 "none of its files ({count}) starts like a table of numbers or an MCAP file"
             ),
         };
-        Failure::failed(
-            ErrorCode::NotFound,
-            format_args!("no recordings found: {rest}; check the path"),
-        )
-        .at(folder.shown())
+        ErrorCode::NotFound
+            .failed(format_args!("no recordings found: {rest}; check the path"))
+            .at(folder.shown())
     }
 
     /// Adds the files that match a pattern; hidden ones only if it contains their leading dot.
     fn add_pattern(&mut self, pattern: &Path) -> Result<(), Failure> {
         let parts: Result<Vec<_>, _> = pattern.components().map(PatternPart::of).collect();
         let parts = parts.map_err(|error| {
-            Failure::usage(ErrorCode::InvalidValue, format_args!("no pattern: {error}"))
+            ErrorCode::InvalidValue
+                .usage(format_args!("no pattern: {error}"))
                 .at(pattern.shown())
         })?;
         let is_fixed = |part: &PatternPart| matches!(part, PatternPart::Fixed(_));
@@ -197,10 +193,9 @@ impl Listing {
         self.add_matching(&root, &root, &parts[fixed..]);
         self.files[before..].sort_by(|a, b| a.path.cmp(&b.path));
         match self.files.len() == before {
-            true => Err(
-                Failure::failed(ErrorCode::NotFound, "matches no file; check the pattern")
-                    .at(pattern.shown()),
-            ),
+            true => Err(ErrorCode::NotFound
+                .failed("matches no file; check the pattern")
+                .at(pattern.shown())),
             false => Ok(()),
         }
     }

@@ -103,13 +103,10 @@ impl Merged {
     pub(crate) fn table(&self) -> Result<Vec<u8>, Failure> {
         match self.problems.len() {
             0 => Ok(summary::csv(self.files.iter())),
-            count => Err(Failure::failed(
-                ErrorCode::ManifestsDiffer,
-                format_args!(
-                    "the manifests are not one finished job ({}, listed above); no table was written",
-                    plural(count as u64, "problem")
-                ),
-            )),
+            count => Err(ErrorCode::ManifestsDiffer.failed(format_args!(
+                "the manifests are not one finished job ({}, listed above); no table was written",
+                plural(count as u64, "problem")
+            ))),
         }
     }
 

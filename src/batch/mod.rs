@@ -114,11 +114,11 @@ pub(crate) fn manifests(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         }
         let inside = manifest::in_folder(path);
         if inside.is_empty() {
-            return Err(Failure::failed(
-                ErrorCode::NotFound,
-                "no manifest in this folder; name the manifests, or the folder of the results",
-            )
-            .at(path.shown()));
+            return Err(ErrorCode::NotFound
+                .failed(
+                    "no manifest in this folder; name the manifests, or the folder of the results",
+                )
+                .at(path.shown()));
         }
         found.extend(inside);
     }
@@ -347,9 +347,7 @@ fn sums(outputs: &[Output], folder: &Path) -> Result<Vec<OutputSum>, Failure> {
 }
 
 fn internal_error(input: &Path) -> Failure {
-    Failure::failed(
-        ErrorCode::InternalError,
-        "internal error, as said above; please report it with this recording",
-    )
-    .at(input.shown())
+    ErrorCode::InternalError
+        .failed("internal error, as said above; please report it with this recording")
+        .at(input.shown())
 }

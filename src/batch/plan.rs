@@ -115,13 +115,10 @@ impl<'a> BatchPlan<'a> {
         let name = task.many.name.as_deref().unwrap_or(task.name);
         let beside = task.beside.iter().map(|(option, path)| {
             crate::cli::many::template(&path.shown().to_string()).map_err(|expected| {
-                Failure::usage(
-                    ErrorCode::ConflictingArguments,
-                    format_args!(
-                        "{option} {}: with several recordings each has its own, in the folder of -o: {expected}",
-                        path.shown()
-                    ),
-                )
+                ErrorCode::ConflictingArguments.usage(format_args!(
+                    "{option} {}: with several recordings each has its own, in the folder of -o: {expected}",
+                    path.shown()
+                ))
             })
         });
         let beside = beside.collect::<Result<Vec<String>, Failure>>()?;
@@ -143,26 +140,20 @@ impl<'a> BatchPlan<'a> {
             for output in &file.outputs {
                 let path = &file.found.path;
                 if let Some(other) = owners.insert(output, path) {
-                    return Err(Failure::usage(
-                        ErrorCode::ConflictingArguments,
-                        format_args!(
-                            "{} and {} would both become {output}; give --name '{{name}}…' if their extensions differ, \
-                             or a folder that contains both, so that its tree is kept",
-                            other.shown(),
-                            path.shown()
-                        ),
-                    ));
+                    return Err(ErrorCode::ConflictingArguments.usage(format_args!(
+                        "{} and {} would both become {output}; give --name '{{name}}…' if their extensions differ, \
+                         or a folder that contains both, so that its tree is kept",
+                        other.shown(),
+                        path.shown()
+                    )));
                 }
                 if let Some(input) = inputs.get(&end_of_links(&self.result(output))) {
-                    return Err(Failure::usage(
-                        ErrorCode::ConflictingArguments,
-                        format_args!(
-                            "the result of {} would overwrite the recording {}; give another --name, or another folder \
-                             with -o",
-                            path.shown(),
-                            input.shown()
-                        ),
-                    ));
+                    return Err(ErrorCode::ConflictingArguments.usage(format_args!(
+                        "the result of {} would overwrite the recording {}; give another --name, or another folder \
+                         with -o",
+                        path.shown(),
+                        input.shown()
+                    )));
                 }
             }
         }
@@ -252,17 +243,17 @@ impl<'a> BatchPlan<'a> {
 /// The folder of the results.
 fn folder(task: &BatchTask) -> Result<PathBuf, Failure> {
     let Some(path) = task.result.output.as_deref().filter(|path| !is_dash(path)) else {
-        return Err(Failure::usage(ErrorCode::MissingArgument, NEED_FOLDER));
+        return Err(ErrorCode::MissingArgument.usage(NEED_FOLDER));
     };
     let is_file = match std::fs::metadata(path) {
         Ok(meta) => !meta.is_dir(),
         Err(_) => !file_name::ends_with_separator(path) && path.extension().is_some(),
     };
     match is_file {
-        true => Err(Failure::usage(
-            ErrorCode::MissingArgument,
-            format_args!("{NEED_FOLDER} ({} names a file)", path.shown()),
-        )),
+        true => Err(ErrorCode::MissingArgument.usage(format_args!(
+            "{NEED_FOLDER} ({} names a file)",
+            path.shown()
+        ))),
         false => Ok(path.to_owned()),
     }
 }

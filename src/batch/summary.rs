@@ -250,13 +250,10 @@ pub(super) fn ended<'a>(
             0 => "; the others are done".to_owned(),
             count => format!(", {count} were not started"),
         };
-        return Err(Failure::failed(
-            ErrorCode::RecordingsFailed,
-            format_args!(
-                "{failed} of {} failed{others}",
-                plural(count as u64, "recording")
-            ),
-        ));
+        return Err(ErrorCode::RecordingsFailed.failed(format_args!(
+            "{failed} of {} failed{others}",
+            plural(count as u64, "recording")
+        )));
     }
     match entries.into_iter().any(|entry| entry.exit != 0) {
         true => Ok(Outcome::WithLoss),

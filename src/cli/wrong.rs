@@ -37,20 +37,17 @@ pub(crate) fn wrong_usage(error: &Error) -> Option<Failure> {
     let text = error.render().to_string();
     error
         .use_stderr()
-        .then(|| Failure::usage(code(error.kind()), message(&text)))
+        .then(|| code(error.kind()).usage(message(&text)))
 }
 
 /// The first argument of the process that is not UTF-8.
 fn not_utf8() -> Failure {
     let mut all = std::env::args_os().skip(1);
     let wrong = all.find(|arg| arg.to_str().is_none());
-    Failure::usage(
-        ErrorCode::InvalidValue,
-        format_args!(
-            "the argument {:?} is not UTF-8; only file names may be in another encoding",
-            wrong.unwrap_or_default()
-        ),
-    )
+    ErrorCode::InvalidValue.usage(format_args!(
+        "the argument {:?} is not UTF-8; only file names may be in another encoding",
+        wrong.unwrap_or_default()
+    ))
 }
 
 fn code(kind: ErrorKind) -> ErrorCode {

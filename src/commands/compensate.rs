@@ -73,8 +73,7 @@ struct Seen {
 /// If the work cannot be done.
 pub fn work(args: &cli::Compensate) -> Result<Made, Failure> {
     if args.json && args.result.is_stdout() {
-        return Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
+        return Err(ErrorCode::ConflictingArguments.usage(
             "--json and the samples both go to standard output; give the samples a file with -o",
         ));
     }

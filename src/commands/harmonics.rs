@@ -164,14 +164,11 @@ impl WayBack {
             return Ok(Self { chain, stand: None });
         }
         let stand = stand.ok_or_else(|| {
-            Failure::usage(
-                ErrorCode::MissingArgument,
-                format_args!(
-                    "\"{}\" is taken as recorded, with the stand's response in it; give --stand FILE (only a channel \
-                     marked \"{COMPENSATED}\", a result of compensate, needs none)",
-                    stream.channel.name
-                ),
-            )
+            ErrorCode::MissingArgument.usage(format_args!(
+                "\"{}\" is taken as recorded, with the stand's response in it; give --stand FILE (only a channel \
+                 marked \"{COMPENSATED}\", a result of compensate, needs none)",
+                stream.channel.name
+            ))
             .at(&stream.source)
         })?;
         stand.mechanics()?;
@@ -237,16 +234,15 @@ fn fundamental(
         }
     });
     found.map_err(|error| match error {
-        Error::NotRefined { .. } => Failure::failed(
-            ErrorCode::NotIdentifiable,
-            match speed::warning(record, given_hz, orders) {
+        Error::NotRefined { .. } => {
+            ErrorCode::NotIdentifiable.failed(match speed::warning(record, given_hz, orders) {
                 Some(changes) => changes.message,
                 None => format!(
                     "{error}; --refine-span searches beyond {} % around it",
                     short(args.refine_span)
                 ),
-            },
-        ),
+            })
+        }
         other => other.into(),
     })
 }
@@ -362,15 +358,12 @@ fn visible_orders(
         .iter()
         .partition(|order| **order < limit * (1.0 - 1e-9));
     if seen.is_empty() {
-        return Err(Failure::failed(
-            ErrorCode::UnsuitableRecord,
-            format_args!(
-                "no order of {} Hz is below half the sampling rate of {} Hz; request lower orders or record at a \
-                 higher rate",
-                short(args.fundamental),
-                short(rate_hz)
-            ),
-        ));
+        return Err(ErrorCode::UnsuitableRecord.failed(format_args!(
+            "no order of {} Hz is below half the sampling rate of {} Hz; request lower orders or record at a \
+             higher rate",
+            short(args.fundamental),
+            short(rate_hz)
+        )));
     }
     if let (Some(first), Some(last)) = (unseen.first(), unseen.last()) {
         warnings.push(Warning::new(

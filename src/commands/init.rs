@@ -45,7 +45,7 @@ pub fn run(args: &Init) -> Result<Outcome, Failure> {
     });
     let text = compose(args, asked.as_mut())?;
     let stand = stand::parse("the new stand file", &text)
-        .map_err(|failure| Failure::usage(ErrorCode::InvalidValue, failure.to_string()))?;
+        .map_err(|failure| ErrorCode::InvalidValue.usage(failure.to_string()))?;
     let mut output = args.result.open(&[])?;
     output.write(text.as_bytes())?;
     output.finish()?;
@@ -66,17 +66,16 @@ impl Dialogue<'_> {
         check: impl Fn(&str) -> Result<(), String>,
     ) -> Result<String, Failure> {
         let broken = |error: std::io::Error| {
-            Failure::failed(ErrorCode::CannotRead, format_args!("no answer: {error}"))
+            ErrorCode::CannotRead.failed(format_args!("no answer: {error}"))
         };
         loop {
             write!(self.output, "{question}: ").map_err(broken)?;
             self.output.flush().map_err(broken)?;
             let mut line = String::new();
             if self.input.read_line(&mut line).map_err(broken)? == 0 {
-                return Err(Failure::failed(
-                    ErrorCode::MissingArgument,
-                    "input ended before the last question",
-                ));
+                return Err(
+                    ErrorCode::MissingArgument.failed("input ended before the last question")
+                );
             }
             let answer = line.trim().to_owned();
             match check(&answer) {
@@ -98,8 +97,7 @@ fn compose(args: &Init, mut dialogue: Option<&mut Dialogue>) -> Result<String, F
             source(&dialogue.ask(question, known)?).map_err(Failure::of(ErrorCode::InvalidValue))?
         }
         (None, None) => {
-            return Err(Failure::usage(
-                ErrorCode::MissingArgument,
+            return Err(ErrorCode::MissingArgument.usage(
                 "give --from transducer, bridge, drawing or unknown; without a terminal no questions are asked",
             ));
         }
@@ -131,16 +129,17 @@ fn compose(args: &Init, mut dialogue: Option<&mut Dialogue>) -> Result<String, F
     }
     args.check_stds(&answers)?;
     if let Some(flag) = args.given_beside(from) {
-        return Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
-            format_args!("--{flag} does not apply to --from {}", word(from)),
-        ));
+        return Err(ErrorCode::ConflictingArguments.usage(format_args!(
+            "--{flag} does not apply to --from {}",
+            word(from)
+        )));
     }
     if !missing.is_empty() {
-        return Err(Failure::usage(
-            ErrorCode::MissingArgument,
-            format_args!("--from {} also needs {}", word(from), missing.join(", ")),
-        ));
+        return Err(ErrorCode::MissingArgument.usage(format_args!(
+            "--from {} also needs {}",
+            word(from),
+            missing.join(", ")
+        )));
     }
     beyond_loop(&answers)?;
     Ok(page(args, from, &answers))
@@ -150,10 +149,7 @@ fn compose(args: &Init, mut dialogue: Option<&mut Dialogue>) -> Result<String, F
 fn no_range(given: String, flag: &str) -> Result<String, Failure> {
     match range::advice(&given) {
         None => Ok(given),
-        Some(advice) => Err(Failure::usage(
-            ErrorCode::InvalidValue,
-            format_args!("--{flag}: {advice}"),
-        )),
+        Some(advice) => Err(ErrorCode::InvalidValue.usage(format_args!("--{flag}: {advice}"))),
     }
 }
 
@@ -175,10 +171,9 @@ fn beyond_loop(answers: &[Answer]) -> Result<(), Failure> {
             continue;
         };
         if let Some(why) = signal.beyond_loop(change, offset) {
-            return Err(Failure::usage(
-                ErrorCode::InvalidValue,
-                format_args!("--sensitivity {output} beside --zero {zero}: {why}"),
-            ));
+            return Err(ErrorCode::InvalidValue.usage(format_args!(
+                "--sensitivity {output} beside --zero {zero}: {why}"
+            )));
         }
     }
     Ok(())
@@ -311,19 +306,13 @@ impl Init {
         for (flag, std) in &self.std {
             let answer = answers.iter().find(|a| a.question.flag == flag);
             let Some(answer) = answer.filter(|a| a.question.has_std()) else {
-                return Err(Failure::usage(
-                    ErrorCode::ConflictingArguments,
-                    format_args!(
-                        "--std {flag}={std}: --{flag} is not given, or has no uncertainty"
-                    ),
-                ));
+                return Err(ErrorCode::ConflictingArguments.usage(format_args!(
+                    "--std {flag}={std}: --{flag} is not given, or has no uncertainty"
+                )));
             };
             let checked = answer.question.check_std(std, &answer.value);
             checked.map_err(|why| {
-                Failure::usage(
-                    ErrorCode::InvalidValue,
-                    format_args!("--std {flag}={std}: {why}"),
-                )
+                ErrorCode::InvalidValue.usage(format_args!("--std {flag}={std}: {why}"))
             })?;
         }
         Ok(())

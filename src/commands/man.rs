@@ -24,14 +24,11 @@ pub fn run(args: &Man) -> Result<Outcome, Failure> {
             write_all(args, folder, &pages)?;
         }
         (Some(folder), false) => {
-            return Err(Failure::usage(
-                ErrorCode::ConflictingArguments,
-                format_args!(
-                    "{} is a folder, for all pages; leave {} out, or name a file",
-                    folder.shown(),
-                    args.verb.join(" ")
-                ),
-            ));
+            return Err(ErrorCode::ConflictingArguments.usage(format_args!(
+                "{} is a folder, for all pages; leave {} out, or name a file",
+                folder.shown(),
+                args.verb.join(" ")
+            )));
         }
         (None, _) => {
             let mut output = args.result.open(&[])?;
@@ -66,10 +63,8 @@ fn find<'a>(program: &'a Command, words: &[String]) -> Result<&'a Command, Failu
                 true => format!("{} has no further verbs", found.get_name()),
                 false => format!("expected one of {}", known.join(", ")),
             };
-            return Err(Failure::usage(
-                ErrorCode::InvalidValue,
-                format_args!("no page on \"{word}\"{meant}; {names}"),
-            ));
+            return Err(ErrorCode::InvalidValue
+                .usage(format_args!("no page on \"{word}\"{meant}; {names}")));
         };
         found = verb;
     }

@@ -82,11 +82,9 @@ pub(super) fn run(args: &impl OneByOne, options: &[String]) -> Result<Outcome, F
         return args.work()?.publish();
     }
     if let ([folder], true, false) = (task.inputs, task.result.is_stdout(), are_asked(args)) {
-        return Err(Failure::failed(
-            ErrorCode::MissingArgument,
-            format_args!("{}", batch::NEED_FOLDER),
-        )
-        .at(folder.shown()));
+        return Err(ErrorCode::MissingArgument
+            .failed(format_args!("{}", batch::NEED_FOLDER))
+            .at(folder.shown()));
     }
     // A fault in the stand file would be reported for each recording.
     if let Some(path) = task.stand {

@@ -12,8 +12,7 @@ use crate::print::{self, Report};
 /// Runs the verb.
 pub fn run(args: &Merge) -> Result<Outcome, Failure> {
     if args.json && args.result.is_stdout() {
-        return Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
+        return Err(ErrorCode::ConflictingArguments.usage(
             "--json and the table both go to standard output; give the table a file with -o",
         ));
     }

@@ -109,14 +109,11 @@ fn find(name: &str) -> Result<&'static DocumentKind, Failure> {
         .find(|document| document.name == name)
         .ok_or_else(|| {
             let names: Vec<&str> = known().collect();
-            Failure::usage(
-                ErrorCode::InvalidValue,
-                format_args!(
-                    "no document of \"{name}\"{}; expected one of {}",
-                    did_you_mean(name, known()),
-                    names.join(", ")
-                ),
-            )
+            ErrorCode::InvalidValue.usage(format_args!(
+                "no document of \"{name}\"{}; expected one of {}",
+                did_you_mean(name, known()),
+                names.join(", ")
+            ))
         })
 }
 

@@ -60,8 +60,7 @@ pub fn work(args: &cli::Simulate) -> Result<Made, Failure> {
     let stand = stand::read(&args.stand)?;
     stand.refuse_late_start(&args.reading)?;
     if args.json && args.result.is_stdout() {
-        return Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
+        return Err(ErrorCode::ConflictingArguments.usage(
             "the record and the JSON document cannot both go to standard output; give the record a file with -o",
         ));
     }
@@ -223,10 +222,8 @@ impl AppliedInput {
 }
 
 fn too_short() -> Failure {
-    Failure::failed(
-        ErrorCode::TooFewSamples,
-        "the record has fewer than two samples; nothing can be simulated",
-    )
+    ErrorCode::TooFewSamples
+        .failed("the record has fewer than two samples; nothing can be simulated")
 }
 
 impl Report for SimulateReport {
@@ -340,14 +337,11 @@ fn applied_unit(
             let is_weight = given.weight_as(wanted.unit.dimension()).is_some();
             let unclear = is_weight.then(|| chosen.unclear_weight(given)).flatten();
             Err(unclear.unwrap_or_else(|| {
-                Failure::failed(
-                    ErrorCode::UnitUnsuitable,
-                    format_args!(
+                ErrorCode::UnitUnsuitable.failed(format_args!(
                         "the channel \"{}\" is in {}, and what acts on this stand is in {expected}; choose another \
                          column with --applied, or give the right unit with --unit",
                         chosen.name, given.text
-                    ),
-                )
+                    ))
             }))
         }
         (None, Some(text)) => Err(chosen.unknown_unit(

@@ -49,17 +49,16 @@ pub fn run(args: &cli::Table) -> Result<Outcome, Failure> {
     let stand = stand::read(&args.stand)?;
     let mechanics = stand.mechanics()?;
     if args.to < args.from {
-        return Err(Failure::usage(
-            ErrorCode::InvalidValue,
-            format_args!("--to {} lies below --from {}", args.to, args.from),
-        ));
+        return Err(ErrorCode::InvalidValue.usage(format_args!(
+            "--to {} lies below --from {}",
+            args.to, args.from
+        )));
     }
     let steps = ((args.to - args.from) / args.step * (1.0 + 1e-12)).floor();
     if steps >= MOST_ROWS {
-        return Err(Failure::usage(
-            ErrorCode::InvalidValue,
-            format_args!("a table of {steps} rows is too long; choose a larger --step"),
-        ));
+        return Err(ErrorCode::InvalidValue.usage(format_args!(
+            "a table of {steps} rows is too long; choose a larger --step"
+        )));
     }
     let refined = match stand.effects.is_empty() && mechanics.measures == Motion::Displacement {
         true => None,

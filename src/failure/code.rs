@@ -1,7 +1,11 @@
 //! Kinds of failure.
 
+use std::fmt;
+
 use schemars::JsonSchema;
 use serde::Serialize;
+
+use super::Failure;
 
 /// Kind of a failure: a stable name, whatever the words of the message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -75,4 +79,16 @@ pub enum ErrorCode {
     ManifestsDiffer,
     /// A fault of torqcomp itself.
     InternalError,
+}
+
+impl ErrorCode {
+    /// A failure of the work.
+    pub fn failed(self, message: impl fmt::Display) -> Failure {
+        Failure::failed(self, message)
+    }
+
+    /// A wrong command line.
+    pub fn usage(self, message: impl fmt::Display) -> Failure {
+        Failure::usage(self, message)
+    }
 }

@@ -200,8 +200,7 @@ impl ChainInverse {
                 return Ok(result);
             }
         }
-        Err(Failure::failed(
-            ErrorCode::NotInvertible,
+        Err(ErrorCode::NotInvertible.failed(
             "the inversion of capacitive coupling and torques in the stand does not converge: one of them is too large \
              to be inverted together with the other; remove one of the effects from the stand file",
         ))

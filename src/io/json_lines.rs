@@ -32,12 +32,9 @@ impl JsonLines {
         let is_of_kind = beginning.as_bytes().starts_with(&first)
             || lines.any(|line| line.starts_with(beginning.as_bytes()));
         if !is_of_kind {
-            return Err(Failure::usage(
-                ErrorCode::ConflictingArguments,
-                format_args!(
-                    "this file has no lines that begin with {beginning}, so nothing is appended to it; name another file"
-                ),
-            )
+            return Err(ErrorCode::ConflictingArguments.usage(format_args!(
+                "this file has no lines that begin with {beginning}, so nothing is appended to it; name another file"
+            ))
             .at(path.shown()));
         }
         if sync {

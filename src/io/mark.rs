@@ -14,14 +14,11 @@ pub(crate) fn names_compensated(name: &str) -> bool {
 
 /// Failure for a result of `compensate` where a recorded signal is required.
 pub(crate) fn already_compensated(source: &str, name: &str) -> Failure {
-    Failure::failed(
-        ErrorCode::AlreadyCompensated,
-        format_args!(
-            "\"{name}\" is marked as compensated: the stand's response is already divided out of it; take the \
-             recorded channel instead, or, if this one is a recorded signal, rename it without \"{COMPENSATED}\" \
-             (harmonics takes it as it is, without --stand)"
-        ),
-    )
+    ErrorCode::AlreadyCompensated.failed(format_args!(
+        "\"{name}\" is marked as compensated: the stand's response is already divided out of it; take the \
+         recorded channel instead, or, if this one is a recorded signal, rename it without \"{COMPENSATED}\" \
+         (harmonics takes it as it is, without --stand)"
+    ))
     .at(source)
 }
 

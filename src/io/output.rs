@@ -82,32 +82,28 @@ impl Output {
                 input if is_dash(input) => "standard input".to_owned(),
                 file => file.shown().to_string(),
             };
-            return Err(Failure::usage(
-                ErrorCode::ConflictingArguments,
-                format_args!("the output is {other} as well; write to another file"),
-            )
-            .at(&name));
+            return Err(ErrorCode::ConflictingArguments
+                .usage(format_args!(
+                    "the output is {other} as well; write to another file"
+                ))
+                .at(&name));
         }
         // A link is followed and preserved; a dangling one also counts as existing.
         let exists = std::fs::symlink_metadata(path).is_ok();
         let kind = match std::fs::metadata(path) {
             Ok(meta) if meta.is_dir() => {
-                return Err(Failure::usage(
-                    ErrorCode::InvalidValue,
-                    "the output is a folder; name a file in it",
-                )
-                .at(&name));
+                return Err(ErrorCode::InvalidValue
+                    .usage("the output is a folder; name a file in it")
+                    .at(&name));
             }
             Ok(meta) if !meta.is_file() => {
                 let file = storage::open_for_writing(path);
                 Kind::Device(file.map_err(|e| Failure::writing(&name, &e))?)
             }
             _ if exists && !policy.replace => {
-                return Err(Failure::failed(
-                    ErrorCode::OutputExists,
-                    "the output exists; give --force to replace it, or another name",
-                )
-                .at(&name));
+                return Err(ErrorCode::OutputExists
+                    .failed("the output exists; give --force to replace it, or another name")
+                    .at(&name));
             }
             found => {
                 let path = end_of_links(path);
@@ -286,13 +282,10 @@ impl Renamed {
             false => Ok(()),
         };
         synced.map_err(|error| {
-            Failure::failed(
-                ErrorCode::CannotWrite,
-                format_args!(
-                    "written and in its place, but its folder cannot be synced: {error}; after a power cut the old \
-                     content may be back"
-                ),
-            )
+            ErrorCode::CannotWrite.failed(format_args!(
+                "written and in its place, but its folder cannot be synced: {error}; after a power cut the old \
+                 content may be back"
+            ))
             .at(self.path.shown())
         })
     }
@@ -301,23 +294,19 @@ impl Renamed {
 fn folder_failure(path: &Path, error: &io::Error) -> Failure {
     let folder = folder_of(path);
     if folder.is_dir() {
-        Failure::failed(
-            ErrorCode::CannotWrite,
-            format_args!(
+        ErrorCode::CannotWrite
+            .failed(format_args!(
                 "cannot be created: {}; check the permissions of its folder",
                 error.kind()
-            ),
-        )
-        .at(path.shown())
+            ))
+            .at(path.shown())
     } else {
-        Failure::failed(
-            ErrorCode::CannotWrite,
-            format_args!(
+        ErrorCode::CannotWrite
+            .failed(format_args!(
                 "the folder {} does not exist; create it first",
                 folder.shown()
-            ),
-        )
-        .at(path.shown())
+            ))
+            .at(path.shown())
     }
 }
 

@@ -66,14 +66,11 @@ impl AlignedChannels {
             let [from, to] = units.map(Option::as_ref);
             let Some(factor) = NamedUnit::factor_between(from, to) else {
                 let [unit, other_unit] = [from, to].map(|unit| unit.map_or("no unit", |u| &u.text));
-                return Err(Failure::failed(
-                    ErrorCode::RecordsDiffer,
-                    format_args!(
-                        "the channel \"{}\" has {unit} in {} and {other_unit} in {}; give its unit with \
-                         --applied-unit or --measured-unit, or take the records one by one",
-                        channel.name, self.source, other.source
-                    ),
-                ));
+                return Err(ErrorCode::RecordsDiffer.failed(format_args!(
+                    "the channel \"{}\" has {unit} in {} and {other_unit} in {}; give its unit with \
+                     --applied-unit or --measured-unit, or take the records one by one",
+                    channel.name, self.source, other.source
+                )));
             };
             if factor != 1.0 {
                 channel
@@ -116,10 +113,7 @@ impl AlignedChannels {
         }
         let (places, chosen): (Vec<usize>, Vec<Selection>) = chosen.into_iter().unzip();
         let Some(first) = chosen.first() else {
-            return Err(Failure::usage(
-                ErrorCode::MissingArgument,
-                "no channel was asked for",
-            ));
+            return Err(ErrorCode::MissingArgument.usage("no channel was asked for"));
         };
         let mut aligned = Self {
             source: recording.source.clone(),
@@ -172,13 +166,10 @@ impl AlignedChannels {
         let end_s = ends.fold(f64::INFINITY, f64::min);
         let count = ((end_s - start_s) * self.rate_hz + 1e-6).floor() + 1.0;
         if count.is_nan() || count < 2.0 {
-            return Err(Failure::failed(
-                ErrorCode::RecordsDiffer,
-                format_args!(
-                    "{} were not recorded at the same time; choose channels of one record",
-                    names(chosen)
-                ),
-            ));
+            return Err(ErrorCode::RecordsDiffer.failed(format_args!(
+                "{} were not recorded at the same time; choose channels of one record",
+                names(chosen)
+            )));
         }
         let recorded = typical_step(&stamps[0]).map(|step| 1.0 / step);
         check_resampled(self.rate_hz, recorded.unwrap_or(self.rate_hz))?;
@@ -290,14 +281,11 @@ fn check_finite(selection: &Selection) -> Result<(), Failure> {
     let channel = selection.channel;
     match channel.samples.iter().position(|v| !v.is_finite()) {
         None => check_size(channel),
-        Some(place) => Err(Failure::failed(
-            ErrorCode::InvalidSample,
-            format_args!(
-                "sample {} of \"{}\" is not a finite number; repair it or cut the record there",
-                place + 1,
-                channel.name
-            ),
-        )),
+        Some(place) => Err(ErrorCode::InvalidSample.failed(format_args!(
+            "sample {} of \"{}\" is not a finite number; repair it or cut the record there",
+            place + 1,
+            channel.name
+        ))),
     }
 }
 
@@ -356,14 +344,11 @@ fn differ(chosen: &[Selection]) -> Failure {
         )
     };
     let all: Vec<String> = chosen.iter().map(one).collect();
-    Failure::failed(
-        ErrorCode::RecordsDiffer,
-        format_args!(
-            "the channels do not lie on one time axis: {}; record them at one rate, or bring one to the rate \
-         of the other with torqcomp extract --resample --rate HZ first",
-            all.join(", ")
-        ),
-    )
+    ErrorCode::RecordsDiffer.failed(format_args!(
+        "the channels do not lie on one time axis: {}; record them at one rate, or bring one to the rate \
+     of the other with torqcomp extract --resample --rate HZ first",
+        all.join(", ")
+    ))
 }
 
 #[cfg(test)]

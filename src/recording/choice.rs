@@ -38,14 +38,11 @@ pub(in crate::recording) fn transposed(columns: usize, rows: Option<usize>) -> O
     let is_short = rows.is_none_or(|rows| 10 * rows < columns);
     (columns >= WIDE && is_short).then(|| {
         let rows = rows.map_or_else(String::new, |rows| format!("{} and ", plural(rows, "row")));
-        Failure::failed(
-            ErrorCode::NotARecording,
-            format_args!(
-                "the table has {rows}{columns} columns: are the samples of a channel in one row? Each channel must \
-                 be a column; transpose the table (in a spreadsheet: paste special, transpose), or choose a column \
-                 with --channel if each is a channel"
-            ),
-        )
+        ErrorCode::NotARecording.failed(format_args!(
+            "the table has {rows}{columns} columns: are the samples of a channel in one row? Each channel must \
+             be a column; transpose the table (in a spreadsheet: paste special, transpose), or choose a column \
+             with --channel if each is a channel"
+        ))
     })
 }
 
@@ -60,19 +57,13 @@ pub(crate) fn choose(
     let Some(wanted) = wanted else {
         return match channels {
             [_] => Ok(0),
-            [] => Err(Failure::failed(
-                ErrorCode::NotARecording,
-                "there is no channel with numbers in it",
-            )),
+            [] => Err(ErrorCode::NotARecording.failed("there is no channel with numbers in it")),
             several => Err(transposed(several.len(), None).unwrap_or_else(|| {
-                Failure::failed(
-                    ErrorCode::ChannelUnclear,
-                    format_args!(
-                        "{} channels could be the signal; choose one with {flag} {}",
-                        several.len(),
-                        names(channels, "or")
-                    ),
-                )
+                ErrorCode::ChannelUnclear.failed(format_args!(
+                    "{} channels could be the signal; choose one with {flag} {}",
+                    several.len(),
+                    names(channels, "or")
+                ))
             })),
         };
     };
@@ -92,14 +83,11 @@ pub(crate) fn choose(
         [_] => "the only channel is",
         _ => "the channels are",
     };
-    Err(Failure::failed(
-        ErrorCode::ChannelNotFound,
-        format_args!(
-            "there is no channel \"{wanted}\"{}; {there_are} {}",
-            did_you_mean(wanted, known),
-            names(channels, "and")
-        ),
-    ))
+    Err(ErrorCode::ChannelNotFound.failed(format_args!(
+        "there is no channel \"{wanted}\"{}; {there_are} {}",
+        did_you_mean(wanted, known),
+        names(channels, "and")
+    )))
 }
 
 /// Index of the channel with this heading or name, ignoring case.
@@ -118,14 +106,11 @@ pub(super) fn by_name(
             [] => {}
             [one] => return Ok(Some(*one)),
             several => {
-                return Err(Failure::failed(
-                    ErrorCode::ChannelUnclear,
-                    format_args!(
-                        "{} channels are called \"{wanted}\"; give the number of the one you mean, {flag} {}",
-                        several.len(),
-                        list(several.iter().map(|i| (i + 1).to_string()))
-                    ),
-                ));
+                return Err(ErrorCode::ChannelUnclear.failed(format_args!(
+                    "{} channels are called \"{wanted}\"; give the number of the one you mean, {flag} {}",
+                    several.len(),
+                    list(several.iter().map(|i| (i + 1).to_string()))
+                )));
             }
         }
     }
@@ -139,19 +124,16 @@ pub(super) fn by_part(channels: &[Label], wanted: &str) -> Result<Option<usize>,
     match *(0..channels.len()).filter(has_part).collect::<Vec<_>>() {
         [] => Ok(None),
         [one] => Ok(Some(one)),
-        ref several => Err(Failure::failed(
-            ErrorCode::ChannelUnclear,
-            format_args!(
-                "\"{wanted}\" is a part of the names of {} channels: {}; give more of it",
-                several.len(),
-                named(
-                    several
-                        .iter()
-                        .map(|place| format!("\"{}\"", channels[*place].name)),
-                    "and"
-                )
-            ),
-        )),
+        ref several => Err(ErrorCode::ChannelUnclear.failed(format_args!(
+            "\"{wanted}\" is a part of the names of {} channels: {}; give more of it",
+            several.len(),
+            named(
+                several
+                    .iter()
+                    .map(|place| format!("\"{}\"", channels[*place].name)),
+                "and"
+            )
+        ))),
     }
 }
 
@@ -317,12 +299,9 @@ impl Recording {
             let number = heading
                 .strip_prefix("column ")
                 .map_or_else(String::new, |number| format!(" {number}"));
-            return Err(Failure::failed(
-                ErrorCode::TimeUnknown,
-                format_args!(
-                    "{assumed}; confirm it with --time-column{number} and --time-unit, or give --rate HZ"
-                ),
-            ));
+            return Err(ErrorCode::TimeUnknown.failed(format_args!(
+                "{assumed}; confirm it with --time-column{number} and --time-unit, or give --rate HZ"
+            )));
         }
         let stamps = axis.stamps_s.as_ref();
         if let (Some(stamps_s), Some(rate_hz), true) = (stamps, axis.rate_hz, reading.resample) {
@@ -409,19 +388,16 @@ impl Recording {
         let place = choose(&labels, choice.channel.as_deref(), choice.flags.channel);
         let place = place.map_err(|failure| match (failure.code(), skipped) {
             (Some(code @ ErrorCode::ChannelNotFound), Some(warning)) => {
-                Failure::failed(code, format_args!("{failure}. {}", warning.message))
+                code.failed(format_args!("{failure}. {}", warning.message))
             }
             _ => failure,
         })?;
         // The requested channel may be in a column that was skipped.
         match skipped.filter(|_| choice.channel.is_none()) {
-            Some(warning) => Err(Failure::failed(
-                ErrorCode::ChannelUnclear,
-                format_args!(
-                    "{}; or choose \"{}\" with {}",
-                    warning.message, self.channels[place].name, choice.flags.channel
-                ),
-            )),
+            Some(warning) => Err(ErrorCode::ChannelUnclear.failed(format_args!(
+                "{}; or choose \"{}\" with {}",
+                warning.message, self.channels[place].name, choice.flags.channel
+            ))),
             None => Ok(place),
         }
     }

@@ -132,13 +132,10 @@ impl Filled {
         if let (Some(&before_s), Some(&before)) = (self.stamps_s.last(), self.samples.last()) {
             let steps = ((time_s - before_s) * rate_hz).round();
             if steps > LONGEST {
-                return Err(Failure::failed(
-                    ErrorCode::IrregularTime,
-                    format_args!(
-                        "{steps} samples are missing at one place, more than --fill bridges ({LONGEST}); cut the \
-                         record there with --range"
-                    ),
-                ));
+                return Err(ErrorCode::IrregularTime.failed(format_args!(
+                    "{steps} samples are missing at one place, more than --fill bridges ({LONGEST}); cut the \
+                     record there with --range"
+                )));
             }
             for step in 1..steps.max(1.0) as usize {
                 let part = step as f64 / steps;

@@ -105,15 +105,12 @@ pub(crate) fn check_size(channel: &Channel) -> Result<(), Failure> {
     let Some(row) = channel.samples.iter().position(|v| v.abs() > LARGEST) else {
         return Ok(());
     };
-    Err(Failure::failed(
-        ErrorCode::InvalidSample,
-        format_args!(
-            "sample {} of \"{}\" is {:e}, beyond any instrument; correct or exclude it",
-            row + 1,
-            channel.name,
-            channel.samples[row]
-        ),
-    ))
+    Err(ErrorCode::InvalidSample.failed(format_args!(
+        "sample {} of \"{}\" is {:e}, beyond any instrument; correct or exclude it",
+        row + 1,
+        channel.name,
+        channel.samples[row]
+    )))
 }
 
 fn refuse_holes(channel: &Channel, by_stamps: bool, remedy: &str) -> Result<(), Failure> {
@@ -142,13 +139,10 @@ fn refuse_holes(channel: &Channel, by_stamps: bool, remedy: &str) -> Result<(), 
         HoleKind::OverRange => "is over range: the peaks of the input are lost",
         HoleKind::Text => "is text, expected a number",
     };
-    let refused = Failure::failed(
-        ErrorCode::InvalidSample,
-        format_args!(
-            "the value of \"{name}\" {what} ({} in all); {remedy}",
-            plural(count, "such cell")
-        ),
-    );
+    let refused = ErrorCode::InvalidSample.failed(format_args!(
+        "the value of \"{name}\" {what} ({} in all); {remedy}",
+        plural(count, "such cell")
+    ));
     // Only texts have lines.
     Err(match hole.line {
         0 => refused.sample(hole.index + 1),

@@ -107,11 +107,12 @@ fn nothing_usable(name: &str, source: SignalReader) -> Failure {
         .into_iter()
         .map(|warning| warning.message)
         .collect();
-    Failure::failed(
-        ErrorCode::DamagedFile,
-        format_args!("no message of {topic} could be used: {}", said.join("; ")),
-    )
-    .at(name)
+    ErrorCode::DamagedFile
+        .failed(format_args!(
+            "no message of {topic} could be used: {}",
+            said.join("; ")
+        ))
+        .at(name)
 }
 
 /// Streamed messages; times are relative to the first one.
@@ -155,14 +156,11 @@ impl MessageBlocks {
     fn relative(&self) -> Result<Vec<f64>, Failure> {
         let one = |time_ns: &i64| match time_ns.checked_sub(self.origin_ns) {
             Some(ns) if ns.abs() < EXACT_NS => Ok(ns as f64),
-            _ => Err(Failure::failed(
-                ErrorCode::IrregularTime,
-                format_args!(
-                    "a message at {time_ns} ns is more than 104 days from the first one at {} ns: the \
+            _ => Err(ErrorCode::IrregularTime.failed(format_args!(
+                "a message at {time_ns} ns is more than 104 days from the first one at {} ns: the \
                  clock jumped; choose another one with --time log, publish or header",
-                    self.origin_ns
-                ),
-            )),
+                self.origin_ns
+            ))),
         };
         self.times_ns.iter().map(one).collect()
     }

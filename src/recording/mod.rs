@@ -295,10 +295,9 @@ pub(crate) fn refuse_for_text(choice: &ChannelChoice, reading: &Reading) -> Resu
 
 fn refuse(given: &[(&str, bool)], why: &str) -> Result<(), Failure> {
     match given.iter().find(|(_, is_given)| *is_given) {
-        Some((flag, _)) => Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
-            format_args!("{flag} does not apply: {why}"),
-        )),
+        Some((flag, _)) => {
+            Err(ErrorCode::ConflictingArguments.usage(format_args!("{flag} does not apply: {why}")))
+        }
         None => Ok(()),
     }
 }

@@ -25,13 +25,10 @@ enum TimeBound {
 impl TimeBound {
     fn parse(text: &str) -> Result<Self, Failure> {
         Self::read(text).ok_or_else(|| {
-            Failure::usage(
-                ErrorCode::InvalidValue,
-                format_args!(
-                    "--range: \"{text}\" is not a time; expected seconds, as 0.5, a time of day, as 14:30:00, or a \
-                     date with a time, as 2024-03-12T13:26:40"
-                ),
-            )
+            ErrorCode::InvalidValue.usage(format_args!(
+                "--range: \"{text}\" is not a time; expected seconds, as 0.5, a time of day, as 14:30:00, or a \
+                 date with a time, as 2024-03-12T13:26:40"
+            ))
         })
     }
 
@@ -60,14 +57,12 @@ impl TimeBound {
             Self::Seconds { ns, .. } => ns.saturating_sub(axis.origin_ns) as f64 * 1e-9,
             Self::Clock(clock) => {
                 let origin = axis.clock.ok_or_else(|| {
-                    Failure::failed(
-                        ErrorCode::RangeEmpty,
+                    ErrorCode::RangeEmpty.failed(
                         "the record has no dates or times of day; give --range in seconds, as 0.5..2",
                     )
                 })?;
                 let total_ns = clock.total_in_zone_of(origin).ok_or_else(|| {
-                    Failure::failed(
-                        ErrorCode::RangeEmpty,
+                    ErrorCode::RangeEmpty.failed(
                         "--range gives a time zone, but the record's times have none; give the times of --range as the \
                          record's clock shows them, without a zone",
                     )
@@ -105,10 +100,9 @@ impl Recording {
             let ends = whole.flatten().map_or_else(String::new, |[from, to]| {
                 format!("; the record runs from {} to {}", from.text(), to.text())
             });
-            return Err(Failure::failed(
-                ErrorCode::RangeEmpty,
-                format_args!("--range contains no samples{ends}"),
-            ));
+            return Err(
+                ErrorCode::RangeEmpty.failed(format_args!("--range contains no samples{ends}"))
+            );
         }
         Ok(())
     }
@@ -140,10 +134,7 @@ impl Channel {
         let from_s = end(&range.from, f64::NEG_INFINITY)?;
         let to_s = end(&range.to, f64::INFINITY)?;
         if from_s >= to_s {
-            return Err(Failure::usage(
-                ErrorCode::InvalidValue,
-                "--range FROM..TO: FROM must be before TO",
-            ));
+            return Err(ErrorCode::InvalidValue.usage("--range FROM..TO: FROM must be before TO"));
         }
         // An imprecise time means the nearest sample.
         let slack_s = self.axis.rate_hz.map_or(0.0, |hz| 1e-6 / hz);

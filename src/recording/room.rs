@@ -87,15 +87,12 @@ impl Room {
         } = *need;
         let gb = |bytes: u64| print::rounded(bytes as f64 * 1e-9, 2);
         if let Some(allowed) = self.allowed.filter(|allowed| least > *allowed) {
-            return Err(Failure::failed(
-                ErrorCode::NotEnoughRoom,
-                format_args!(
-                    "{take} at least {} GB of memory, and this process may have {} GB; raise the limit (ulimit -v), or \
-                     {remedy}",
-                    gb(least),
-                    gb(allowed)
-                ),
-            )
+            return Err(ErrorCode::NotEnoughRoom.failed(format_args!(
+                "{take} at least {} GB of memory, and this process may have {} GB; raise the limit (ulimit -v), or \
+                 {remedy}",
+                gb(least),
+                gb(allowed)
+            ))
             .at(name));
         }
         let is_short = |free: &u64| usual > *free;

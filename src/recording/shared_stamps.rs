@@ -51,16 +51,13 @@ pub(super) fn refuse_shared_stamps(
 ) -> Result<(), Failure> {
     let rounded = rounding(stamps, step, origin);
     match rounded.filter(|line| line.quantum_s > SHARED * line.step_s) {
-        Some(line) => Err(Failure::failed(
-            ErrorCode::IrregularTime,
-            format_args!(
-                "the time stamps are rounded to {} s, and {} samples on average share one; --resample would keep only one \
-                 of them: omit it, and the samples are placed at the {} Hz that all stamps together give",
-                digits::text(line.quantum_s * of_seconds, 3),
-                digits::text(line.quantum_s / line.step_s, 3),
-                digits::text(1.0 / (line.step_s * of_seconds), 7),
-            ),
-        )),
+        Some(line) => Err(ErrorCode::IrregularTime.failed(format_args!(
+            "the time stamps are rounded to {} s, and {} samples on average share one; --resample would keep only one \
+             of them: omit it, and the samples are placed at the {} Hz that all stamps together give",
+            digits::text(line.quantum_s * of_seconds, 3),
+            digits::text(line.quantum_s / line.step_s, 3),
+            digits::text(1.0 / (line.step_s * of_seconds), 7),
+        ))),
         None => Ok(()),
     }
 }

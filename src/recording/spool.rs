@@ -39,13 +39,10 @@ impl Spool {
         match more.is_empty() {
             true => Ok(()),
             false => self.write(more).map_err(|error| {
-                Failure::failed(
-                    ErrorCode::NotEnoughRoom,
-                    format_args!(
-                        "the samples do not fit into a scratch file there: {error}; name a folder with room for 8 \
-                         bytes a sample in TMPDIR"
-                    ),
-                )
+                ErrorCode::NotEnoughRoom.failed(format_args!(
+                    "the samples do not fit into a scratch file there: {error}; name a folder with room for 8 \
+                     bytes a sample in TMPDIR"
+                ))
                 .at(std::env::temp_dir().shown())
             }),
         }

@@ -85,9 +85,7 @@ impl TimeAxis {
             Some(typical) => sharpened(typical, first, later, origin).unwrap_or(typical),
             None => mean_step(first)
                 .filter(|_| reading.resample && reading.rate_hz.is_some())
-                .ok_or_else(|| {
-                    Failure::failed(ErrorCode::IrregularTime, no_step(heading, first))
-                })?,
+                .ok_or_else(|| ErrorCode::IrregularTime.failed(no_step(heading, first)))?,
         };
         grid.resampled = reading.resample;
         if reading.resample {
@@ -205,17 +203,14 @@ impl StampGrid {
         }
         if let Some(blocks) = &self.blocks {
             let said = blocks.explain(self.seconds_per_unit);
-            return Err(Failure::failed(ErrorCode::IrregularTime, said));
+            return Err(ErrorCode::IrregularTime.failed(said));
         }
-        Err(Failure::failed(
-            ErrorCode::IrregularTime,
-            format_args!(
-                "the time stamps are rounded to {} s and allow {}; that is too uncertain to divide out a resonance: \
-                 give the recorder's rate with --rate HZ",
-                digits::text(self.quantum * self.seconds_per_unit, 3),
-                rates_of([1.0 - part, 1.0 + part].map(|part| part / rate_hz))
-            ),
-        ))
+        Err(ErrorCode::IrregularTime.failed(format_args!(
+            "the time stamps are rounded to {} s and allow {}; that is too uncertain to divide out a resonance: \
+             give the recorder's rate with --rate HZ",
+            digits::text(self.quantum * self.seconds_per_unit, 3),
+            rates_of([1.0 - part, 1.0 + part].map(|part| part / rate_hz))
+        )))
     }
 
     /// A warning if stamps are rounded so coarsely that single steps mean little; `span` is the time that they cover,
@@ -301,7 +296,7 @@ impl StampGrid {
         let Some(missing) = self.missing.filter(|_| !self.resampled) else {
             return Ok(());
         };
-        let failure = Failure::failed(ErrorCode::IrregularTime, self.explain_missing(&missing));
+        let failure = ErrorCode::IrregularTime.failed(self.explain_missing(&missing));
         Err(failure.sample(missing.at.row + 1).with(|place| {
             place.time_s = Some(self.time_s(missing.at.after));
         }))
@@ -464,10 +459,11 @@ impl Channel {
             return Some(missing);
         }
         let found = grid.first_irregular(None, stamps_s)?;
-        let failure = Failure::failed(
-            ErrorCode::IrregularTime,
-            format_args!("\"{}\": {}", self.name, grid.explain(&found)),
-        );
+        let failure = ErrorCode::IrregularTime.failed(format_args!(
+            "\"{}\": {}",
+            self.name,
+            grid.explain(&found)
+        ));
         Some(failure.sample(found.row + 1).with(|place| {
             place.time_s = Some(grid.time_s(found.after));
         }))
@@ -493,15 +489,12 @@ pub(super) fn check_resampled(rate_hz: f64, recorded_hz: f64) -> Result<(), Fail
     if (low * recorded_hz..=high * recorded_hz).contains(&rate_hz) {
         return Ok(());
     }
-    Err(Failure::failed(
-        ErrorCode::IrregularTime,
-        format_args!(
-            "the stamps come at {} Hz; --resample with --rate {} would alias high frequencies or invent samples. \
-             Resample near the recorded rate, and limit the band with --band",
-            digits::text(recorded_hz, 6),
-            digits::text(rate_hz, 6)
-        ),
-    ))
+    Err(ErrorCode::IrregularTime.failed(format_args!(
+        "the stamps come at {} Hz; --resample with --rate {} would alias high frequencies or invent samples. \
+         Resample near the recorded rate, and limit the band with --band",
+        digits::text(recorded_hz, 6),
+        digits::text(rate_hz, 6)
+    )))
 }
 
 #[cfg(test)]

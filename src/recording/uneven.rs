@@ -60,11 +60,8 @@ pub(super) fn without_rate(channel: &Channel) -> Failure {
         }
         None => no_stamps(&channel.axis, given),
     };
-    Failure::failed(
-        ErrorCode::TimeUnknown,
-        format_args!(
-            "the sampling rate of \"{}\" is unknown, because {why}",
-            channel.name
-        ),
-    )
+    ErrorCode::TimeUnknown.failed(format_args!(
+        "the sampling rate of \"{}\" is unknown, because {why}",
+        channel.name
+    ))
 }

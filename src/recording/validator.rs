@@ -213,14 +213,12 @@ impl StreamValidator {
         let (lost, warnings) = blocks.finish();
         if self.samples < 2 {
             let why = lost.map_or(String::new(), |lost| format!(": {}", lost.message));
-            return Err(Failure::failed(
-                ErrorCode::TooFewSamples,
-                format_args!(
+            return Err(ErrorCode::TooFewSamples
+                .failed(format_args!(
                     "{} of numbers; a record has at least two{why}",
                     plural(self.samples, "row")
-                ),
-            )
-            .at(&self.source));
+                ))
+                .at(&self.source));
         }
         self.lost = self.lost.or(lost);
         self.warnings.extend(warnings);
@@ -261,7 +259,7 @@ impl StreamValidator {
 
     fn at(&self, line: usize, code: ErrorCode, message: impl std::fmt::Display) -> Failure {
         let place = ErrorPlace::of_row(&self.source, self.row_kind, line);
-        Failure::failed(code, message).with(|known| *known = place)
+        code.failed(message).with(|known| *known = place)
     }
 
     fn irregular(&self, line: usize, found: &IrregularStep) -> Failure {

@@ -204,12 +204,9 @@ impl Calibration {
     pub fn of_compensated(channel: RecordedChannel, units: UnitSystem) -> Result<Self, Failure> {
         let named = channel.unit.ok_or_else(|| {
             let name = channel.name;
-            Failure::failed(
-                ErrorCode::UnitUnclear,
-                format_args!(
-                    "the channel \"{name}\" has no unit; give it with --unit \"N m\" (or \"ft lbf\", N)"
-                ),
-            )
+            ErrorCode::UnitUnclear.failed(format_args!(
+                "the channel \"{name}\" has no unit; give it with --unit \"N m\" (or \"ft lbf\", N)"
+            ))
         })?;
         Ok(Self {
             recorded_factor: named.unit.factor(),
@@ -357,29 +354,20 @@ impl Stand {
 fn without_unit(channel: RecordedChannel) -> Failure {
     let name = channel.name;
     if let Some(scaled) = heading_scale::scaled_unit(channel) {
-        return Failure::failed(
-            ErrorCode::UnitUnclear,
-            format_args!(
-                "the unit of the channel \"{name}\" contains a scale factor, \"{scaled}\"; scale the numbers to a plain unit \
-                 and rename the column, or give their unit with --unit if they are not scaled"
-            ),
-        );
+        return ErrorCode::UnitUnclear.failed(format_args!(
+            "the unit of the channel \"{name}\" contains a scale factor, \"{scaled}\"; scale the numbers to a plain unit \
+             and rename the column, or give their unit with --unit if they are not scaled"
+        ));
     }
     match channel.unit_text {
-        None => Failure::failed(
-            ErrorCode::UnitUnclear,
-            format_args!(
+        None => ErrorCode::UnitUnclear.failed(format_args!(
                 "the channel \"{name}\" has no unit; give it: --unit V for the output of an amplifier or recorder \
                  (likewise mV/V, mA, Hz, ustrain), --unit \"N m\" (or N) for a torque (or force), as from simulate"
-            ),
-        ),
-        Some(OF_FULL_SCALE) => Failure::failed(
-            ErrorCode::UnitUnclear,
-            format_args!(
+            )),
+        Some(OF_FULL_SCALE) => ErrorCode::UnitUnclear.failed(format_args!(
                 "the samples of the channel \"{name}\" are fractions of full scale, which the file does not state; \
                  give it with its unit, as --full-scale \"10 V\""
-            ),
-        ),
+            )),
         Some(text) => channel.unknown_unit(
             text,
             "give a known one with --unit, such as V, mV/V, \"N m\"",
@@ -391,24 +379,18 @@ fn without_unit(channel: RecordedChannel) -> Failure {
 fn no_torque(channel: RecordedChannel, named: &NamedUnit) -> Failure {
     let (name, text) = (channel.name, &named.text);
     if named.unit.ratio_of() == Some(RatioOf::Anything) {
-        return Failure::failed(
-            ErrorCode::UnitUnclear,
-            format_args!(
+        return ErrorCode::UnitUnclear.failed(format_args!(
                 "the channel \"{name}\" is in \"{text}\", which could be bridge output over excitation, a strain, \
                  or a fraction of full scale; give --unit \"{text} V/V\" for the first or \"{text} strain\" for the \
                  second"
-            ),
-        );
+            ));
     }
     if let Some(unclear) = channel.unclear_weight(named) {
         return unclear;
     }
-    Failure::failed(
-        ErrorCode::UnitUnsuitable,
-        format_args!(
+    ErrorCode::UnitUnsuitable.failed(format_args!(
             "the channel \"{name}\" is in \"{text}\" ({}), which cannot be converted to torque; expected volts, \
              mV/V, mA, Hz, strain, torque or force",
             named.unit.dimension()
-        ),
-    )
+        ))
 }

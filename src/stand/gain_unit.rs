@@ -50,7 +50,7 @@ pub(super) fn check(
     } else {
         return Ok(());
     };
-    Err(Failure::failed(ErrorCode::UnitUnsuitable, why))
+    Err(ErrorCode::UnitUnsuitable.failed(why))
 }
 
 /// Whether a record in a unit is one of an applied quantity; scales show a force as a mass.

@@ -261,7 +261,7 @@ pub struct RecorderData {
 impl Stand {
     /// A failure due to the stand file.
     pub(crate) fn failed(&self, code: ErrorCode, message: impl Display) -> Failure {
-        Failure::failed(code, message).at(&self.file)
+        code.failed(message).at(&self.file)
     }
 
     /// The mechanics, or a failure that says what to write.

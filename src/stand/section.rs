@@ -21,7 +21,8 @@ pub struct SourceText<'a> {
 impl SourceText<'_> {
     /// A failure at a byte of the file.
     pub fn at(&self, offset: Option<usize>, message: impl std::fmt::Display) -> Failure {
-        Failure::failed(ErrorCode::InvalidStand, message)
+        ErrorCode::InvalidStand
+            .failed(message)
             .at(self.name)
             .with(|place| {
                 let before = offset.map(|offset| &self.text[..offset]);

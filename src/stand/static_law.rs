@@ -79,17 +79,14 @@ impl Stand {
             }
             _ => format!("give the calibration in {}", signal.usual_unit().0),
         };
-        Err(Failure::failed(
-            ErrorCode::UnitUnsuitable,
-            format_args!(
-                "the channel \"{channel}\" is a {} in \"{}\", and [calibration] of {} is in {}; choose another \
-                 channel, say the unit with --unit, or {remedy}",
-                signal.kind().name(),
-                named.text,
-                self.file,
-                measured.signal.usual_unit().0
-            ),
-        ))
+        Err(ErrorCode::UnitUnsuitable.failed(format_args!(
+            "the channel \"{channel}\" is a {} in \"{}\", and [calibration] of {} is in {}; choose another \
+             channel, say the unit with --unit, or {remedy}",
+            signal.kind().name(),
+            named.text,
+            self.file,
+            measured.signal.usual_unit().0
+        )))
     }
 
     /// The record at no load, if given for such a signal.

@@ -329,7 +329,7 @@ fn put(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<(), Fail
 
 /// A failure due to a stand file of this name.
 fn invalid(name: &str, message: impl std::fmt::Display) -> Failure {
-    Failure::failed(ErrorCode::InvalidStand, message).at(name)
+    ErrorCode::InvalidStand.failed(message).at(name)
 }
 
 /// A quantity with its standard uncertainty and its source, with nine significant digits, more than any record can

@@ -116,9 +116,8 @@ impl Wanted<'_> {
                 (Band::new(rate_hz, top_hz), from, Some(seconds))
             }
         };
-        let band = band.map_err(|error| {
-            Failure::failed(ErrorCode::UnsuitableRecord, error).at(&stream.source)
-        })?;
+        let band =
+            band.map_err(|error| ErrorCode::UnsuitableRecord.failed(error).at(&stream.source))?;
         let report = BandReport {
             top_hz: band.top_hz(),
             end_hz: band.end_hz(),

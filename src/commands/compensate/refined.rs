@@ -89,20 +89,15 @@ pub(super) fn run(
 fn check(record: &UniformRecord, undo: &ChainInverse) -> Result<(), Failure> {
     let count = record.samples.count();
     if count < 2 {
-        return Err(Failure::failed(
-            ErrorCode::TooFewSamples,
-            "the record has fewer than two samples; nothing can be compensated",
-        ));
+        return Err(ErrorCode::TooFewSamples
+            .failed("the record has fewer than two samples; nothing can be compensated"));
     }
     if count > MOST_SAMPLES && undo.margin().is_none() {
-        return Err(Failure::failed(
-            ErrorCode::TooManySamples,
-            format_args!(
-                "the record has {count} samples; an effect of this stand needs the whole record in memory, at most \
-                 {MOST_SAMPLES} samples; cut the record into parts of {} s",
-                rounded(MOST_SAMPLES as f64 / record.rate_hz, 3)
-            ),
-        ));
+        return Err(ErrorCode::TooManySamples.failed(format_args!(
+            "the record has {count} samples; an effect of this stand needs the whole record in memory, at most \
+             {MOST_SAMPLES} samples; cut the record into parts of {} s",
+            rounded(MOST_SAMPLES as f64 / record.rate_hz, 3)
+        )));
     }
     Ok(())
 }

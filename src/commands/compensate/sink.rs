@@ -135,10 +135,8 @@ impl Messages {
             .unwrap_or(writer::TOPIC)
             .to_owned();
         let encoding = origin.encoding.ok_or_else(|| {
-            Failure::failed(
-                ErrorCode::UnsuitableRecord,
-                "the messages have an encoding that torqcomp does not write",
-            )
+            ErrorCode::UnsuitableRecord
+                .failed("the messages have an encoding that torqcomp does not write")
         })?;
         let added = Added {
             topic: topic.clone(),
@@ -186,32 +184,26 @@ fn format(args: &Compensate) -> Format {
 /// The source of the input's messages, if the result can be a copy of them.
 fn origin(args: &Compensate, plan: &Plan) -> Result<MessageOrigin, Failure> {
     let Some(origin) = &plan.stream.origin else {
-        return Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
+        return Err(ErrorCode::ConflictingArguments.usage(
             "an MCAP result is a copy of an MCAP input with an additional channel: the input must be MCAP and its \
              samples unchanged, without --range, --fill or --resample; use --format csv",
         ));
     };
     if args.record.input() == "-" {
-        return Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
+        return Err(ErrorCode::ConflictingArguments.usage(
             "an MCAP result reads its input twice, but standard input can be read only once; name the file",
         ));
     }
     if args.with_recorded {
-        return Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
+        return Err(ErrorCode::ConflictingArguments.usage(
             "--with-recorded adds a column of text; an MCAP result keeps the recorded channel anyway",
         ));
     }
     if plan.chain.applied.name != "torque" {
-        return Err(Failure::failed(
-            ErrorCode::UnitUnsuitable,
-            format_args!(
-                "an MCAP result contains torque in N m, but this record becomes a {} in {}; use --format csv",
-                plan.chain.applied.name, plan.chain.applied.unit
-            ),
-        ));
+        return Err(ErrorCode::UnitUnsuitable.failed(format_args!(
+            "an MCAP result contains torque in N m, but this record becomes a {} in {}; use --format csv",
+            plan.chain.applied.name, plan.chain.applied.unit
+        )));
     }
     Ok(origin.clone())
 }

@@ -8,27 +8,21 @@ use crate::unit::NamedUnit;
 /// Converts a record to the units of the first; rejects it if they are of different kinds, or its rate differs.
 pub(super) fn make_alike(first: &Pair, other: &mut Pair) -> Result<(), Failure> {
     if (first.rate_hz / other.rate_hz - 1.0).abs() > 1e-4 {
-        return Err(Failure::failed(
-            ErrorCode::RecordsDiffer,
-            format_args!(
-                "{} is sampled at {} Hz, {} at {} Hz: all records of a diagnosis must have the same sampling rate; \
-                 resample one of them",
-                first.source,
-                short(first.rate_hz),
-                other.source,
-                short(other.rate_hz)
-            ),
-        ));
+        return Err(ErrorCode::RecordsDiffer.failed(format_args!(
+            "{} is sampled at {} Hz, {} at {} Hz: all records of a diagnosis must have the same sampling rate; \
+             resample one of them",
+            first.source,
+            short(first.rate_hz),
+            other.source,
+            short(other.rate_hz)
+        )));
     }
     let differ = || {
-        Failure::failed(
-            ErrorCode::RecordsDiffer,
-            format_args!(
-                "{} and {} have their channels in units of different kinds, or only one of them says its units; choose \
-                 the channels of one kind, or write the units into its headings",
-                first.source, other.source
-            ),
-        )
+        ErrorCode::RecordsDiffer.failed(format_args!(
+            "{} and {} have their channels in units of different kinds, or only one of them says its units; choose \
+             the channels of one kind, or write the units into its headings",
+            first.source, other.source
+        ))
     };
     let factor = |of: fn(&Pair) -> &Option<NamedUnit>| {
         let [from, to] = [&*other, first].map(|pair| of(pair).as_ref());
@@ -61,13 +55,10 @@ pub(super) fn refuse_same_samples(train: &[Pair], holdout: &[Pair]) -> Result<()
                 Some(_) => "omit --holdout to hold out the last 30 % of each training record",
                 None => "omit --holdout-decay to hold out the last of several decays",
             };
-            Err(Failure::failed(
-                ErrorCode::RecordsDiffer,
-                format_args!(
-                    "{} has the same samples as the training record {}; give another hold-out record, or {omit}",
-                    h.source, t.source
-                ),
-            ))
+            Err(ErrorCode::RecordsDiffer.failed(format_args!(
+                "{} has the same samples as the training record {}; give another hold-out record, or {omit}",
+                h.source, t.source
+            )))
         }
     }
 }

@@ -18,12 +18,9 @@ pub fn decays(args: &Diagnose, file: &Path) -> Result<Vec<Pair>, Failure> {
     let ranges = onset::decays(&read.measured).into_iter();
     let long: Vec<Range<usize>> = ranges.filter(|range| range.len() >= FEWEST).collect();
     if long.is_empty() {
-        return Err(Failure::failed(
-            ErrorCode::TooFewSamples,
-            format_args!(
-                "no free decay of at least {FEWEST} samples is found; try another channel or --range, or record for longer"
-            ),
-        )
+        return Err(ErrorCode::TooFewSamples.failed(format_args!(
+            "no free decay of at least {FEWEST} samples is found; try another channel or --range, or record for longer"
+        ))
         .at(&read.source));
     }
     let times_s = (0..read.measured.len()).map(|i| read.start_s + i as f64 / read.rate_hz);
@@ -57,8 +54,7 @@ pub fn decays(args: &Diagnose, file: &Path) -> Result<Vec<Pair>, Failure> {
 /// Rejects arguments that do not apply to free-decay records.
 pub fn check_arguments(args: &Diagnose) -> Result<(), Failure> {
     if args.training_files().is_empty() {
-        return Err(Failure::usage(
-            ErrorCode::MissingArgument,
+        return Err(ErrorCode::MissingArgument.usage(
             "--holdout-decay and --running only check a fit, and no record to fit is given: add a free decay with \
              --decay FILE, or a record with an applied quantity with --train FILE and --applied COL",
         ));
@@ -70,13 +66,10 @@ pub fn check_arguments(args: &Diagnose) -> Result<(), Failure> {
     let given = of_applied.into_iter().find(|(_, value)| value.is_some());
     match given {
         Some((flag, _)) if args.train.is_empty() && args.static_loads.is_empty() => {
-            Err(Failure::usage(
-                ErrorCode::ConflictingArguments,
-                format_args!(
-                    "{flag} does not apply to --decay, as nothing acts on a stand during a free decay: omit {flag}, or \
-                     give records with an applied quantity with --train or --static"
-                ),
-            ))
+            Err(ErrorCode::ConflictingArguments.usage(format_args!(
+                "{flag} does not apply to --decay, as nothing acts on a stand during a free decay: omit {flag}, or \
+                 give records with an applied quantity with --train or --static"
+            )))
         }
         _ => Ok(()),
     }
@@ -85,8 +78,7 @@ pub fn check_arguments(args: &Diagnose) -> Result<(), Failure> {
 /// The last decay, removed from the training records, which must contain another one.
 pub fn last(train: &mut Vec<Pair>) -> Result<Option<Pair>, Failure> {
     if let [only] = train.as_slice() {
-        return Err(Failure::failed(
-            ErrorCode::TooFewSamples,
+        return Err(ErrorCode::TooFewSamples.failed(
             "the only decay is fitted, and none is left to check the result: record another one, preferably of another \
              size, and give it with --holdout-decay",
         )
@@ -97,8 +89,7 @@ pub fn last(train: &mut Vec<Pair>) -> Result<Option<Pair>, Failure> {
 
 /// A stand file from free decays alone would lack the gain that its effects need.
 pub fn no_gain() -> Failure {
-    Failure::usage(
-        ErrorCode::MissingArgument,
+    ErrorCode::MissingArgument.usage(
         "a free decay does not determine the gain, without which a stand file cannot express an effect in the unit of \
          the record as a torque: give known loads with --static FILE and --applied COL, or --stand FILE with a \
          static_gain or a [calibration], or omit -o",

@@ -36,11 +36,9 @@ fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
     let (load, applied_unit, of_load) = recording.column(load)?;
     let (gage, measured_unit, of_gage) = recording.column(gage)?;
     if load.samples.len() != gage.samples.len() {
-        return Err(Failure::failed(
-            ErrorCode::RecordsDiffer,
-            "the columns differ in length; each load needs a reading",
-        )
-        .at(&recording.source));
+        return Err(ErrorCode::RecordsDiffer
+            .failed("the columns differ in length; each load needs a reading")
+            .at(&recording.source));
     }
     Ok(Pair {
         source: recording.source.clone(),
@@ -72,14 +70,11 @@ pub(super) fn check_units(loads: &[Pair], record: &Pair) -> Result<(), Failure> 
     };
     match loads.iter().find(differs) {
         None => Ok(()),
-        Some(load) => Err(Failure::failed(
-            ErrorCode::RecordsDiffer,
-            format_args!(
-                "{} and {} have their channels in units of different kinds; give --applied-unit and --measured-unit, or convert one \
-                 of them",
-                record.source, load.source
-            ),
-        )),
+        Some(load) => Err(ErrorCode::RecordsDiffer.failed(format_args!(
+            "{} and {} have their channels in units of different kinds; give --applied-unit and --measured-unit, or convert one \
+             of them",
+            record.source, load.source
+        ))),
     }
 }
 

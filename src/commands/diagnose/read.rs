@@ -72,7 +72,8 @@ impl Pair {
         };
         let mut values = self.measured.clone();
         convert(&chain, &mut values).map_err(|(row, why)| {
-            Failure::failed(ErrorCode::InvalidSample, why)
+            ErrorCode::InvalidSample
+                .failed(why)
                 .sample(row + 1)
                 .at(&self.source)
         })?;
@@ -234,12 +235,11 @@ fn pairs(args: &Diagnose) -> Result<(Vec<Pair>, Vec<Pair>), Failure> {
 /// The columns of applied and measured quantity; `without`: message if the first is not named.
 pub(super) fn two_columns(args: &Diagnose, without: &str) -> Result<[ChannelChoice; 2], Failure> {
     let applied = args.applied.as_deref();
-    let applied = applied.ok_or_else(|| Failure::usage(ErrorCode::MissingArgument, without))?;
+    let applied = applied.ok_or_else(|| ErrorCode::MissingArgument.usage(without))?;
     if applied == args.measured {
-        return Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
-            "--applied and --measured name the same column",
-        ));
+        return Err(
+            ErrorCode::ConflictingArguments.usage("--applied and --measured name the same column")
+        );
     }
     Ok(ChannelChoice::applied_and_measured(
         [applied, &args.measured],
@@ -259,12 +259,9 @@ fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
     measured.must_be_as_recorded(&read.source)?;
     let count = applied.samples.len();
     if count < FEWEST {
-        return Err(Failure::failed(
-            ErrorCode::TooFewSamples,
-            format_args!(
-                "{count} samples are too few; a diagnosis needs at least {FEWEST}, and ten periods of the stand"
-            ),
-        )
+        return Err(ErrorCode::TooFewSamples.failed(format_args!(
+            "{count} samples are too few; a diagnosis needs at least {FEWEST}, and ten periods of the stand"
+        ))
         .at(&read.source));
     }
     Ok(Pair {
@@ -382,12 +379,10 @@ fn refuse_constant(source: &str, which: &str, values: &[f64]) -> Result<(), Fail
     if spread > 1e-12 * mean.abs() {
         return Ok(());
     }
-    Err(Failure::failed(
-        ErrorCode::UnsuitableRecord,
-        format_args!(
+    Err(ErrorCode::UnsuitableRecord
+        .failed(format_args!(
             "the {which} channel is constant ({}): a diagnosis needs excitation; check the column",
             short(mean)
-        ),
-    )
-    .at(source))
+        ))
+        .at(source))
 }

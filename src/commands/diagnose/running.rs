@@ -40,14 +40,11 @@ pub(super) fn pairs(args: &Diagnose, record: &Pair) -> Result<Vec<Pair>, Failure
     };
     match running.iter().find(differs) {
         None => Ok(running),
-        Some(other) => Err(Failure::failed(
-            ErrorCode::RecordsDiffer,
-            format_args!(
-                "{} and {} have the measured quantity in units of different kinds; give --measured-unit, or convert one \
-                 of them",
-                record.source, other.source
-            ),
-        )),
+        Some(other) => Err(ErrorCode::RecordsDiffer.failed(format_args!(
+            "{} and {} have the measured quantity in units of different kinds; give --measured-unit, or convert one \
+             of them",
+            record.source, other.source
+        ))),
     }
 }
 

@@ -141,7 +141,7 @@ pub(super) fn from_residue(
             short(inertia_kg_m2)
         );
         if findings.result.output.is_some() {
-            return Err(Failure::failed(ErrorCode::NotIdentifiable, text));
+            return Err(ErrorCode::NotIdentifiable.failed(text));
         }
         result.warn("impossible", text);
         return Ok(Vec::new());

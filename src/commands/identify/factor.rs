@@ -12,13 +12,10 @@ pub(super) fn factor_of(
     (channel, unit_flag): (RecordedChannel, &str),
 ) -> Result<(f64, Dimension), Failure> {
     let wrong = || {
-        Failure::usage(
-            ErrorCode::InvalidValue,
-            format_args!(
-                "--torque-factor {text}: expected a number, a unit of torque or force, and \"/\" the unit of \
-             the channel, such as \"35.15 N/V\""
-            ),
-        )
+        ErrorCode::InvalidValue.usage(format_args!(
+            "--torque-factor {text}: expected a number, a unit of torque or force, and \"/\" the unit of \
+         the channel, such as \"35.15 N/V\""
+        ))
     };
     let (number, units) = text.trim().split_once(' ').ok_or_else(wrong)?;
     let number: f64 = number.parse().map_err(|_| wrong())?;
@@ -30,14 +27,11 @@ pub(super) fn factor_of(
     }
     let scale = match channel.unit {
         Some(of) if of.unit.dimension() != per.dimension() => {
-            return Err(Failure::failed(
-                ErrorCode::UnitUnsuitable,
-                format_args!(
-                    "--torque-factor {text} does not match channel \"{}\", which is in {}; give torque or force per \
-                     {}, or {unit_flag} if the channel is in another unit",
-                    channel.name, of.text, of.text
-                ),
-            ));
+            return Err(ErrorCode::UnitUnsuitable.failed(format_args!(
+                "--torque-factor {text} does not match channel \"{}\", which is in {}; give torque or force per \
+                 {}, or {unit_flag} if the channel is in another unit",
+                channel.name, of.text, of.text
+            )));
         }
         Some(of) => of.unit.factor() / per.factor(),
         None => 1.0,

@@ -156,8 +156,7 @@ impl Targets {
     fn open(findings: &Findings, inputs: &[PathBuf]) -> Result<Self, Failure> {
         let result = &findings.result;
         if result.output.as_deref().is_some_and(is_dash) && findings.json {
-            return Err(Failure::usage(
-                ErrorCode::ConflictingArguments,
+            return Err(ErrorCode::ConflictingArguments.usage(
                 "the stand file and the JSON document cannot both go to standard output; give -o FILE",
             ));
         }
@@ -193,10 +192,9 @@ fn unit_or(channel: RecordedChannel, flag: &str) -> Result<NamedUnit, Failure> {
     channel.unit.cloned().ok_or_else(|| {
         let name = channel.name;
         match channel.unit_text {
-            None => Failure::failed(
-                ErrorCode::UnitUnclear,
-                format_args!("channel \"{name}\" has no unit; give it with {flag}"),
-            ),
+            None => ErrorCode::UnitUnclear.failed(format_args!(
+                "channel \"{name}\" has no unit; give it with {flag}"
+            )),
             Some(text) => channel.unknown_unit(text, &format!("give a known one with {flag}")),
         }
     })
@@ -208,10 +206,7 @@ fn positive(flag: &str, text: &str, kind: Kind) -> Result<f64, Failure> {
     if value > 0.0 {
         Ok(value)
     } else {
-        Err(Failure::usage(
-            ErrorCode::InvalidValue,
-            format_args!("{flag} {text}: it must be greater than 0"),
-        ))
+        Err(ErrorCode::InvalidValue.usage(format_args!("{flag} {text}: it must be greater than 0")))
     }
 }
 
@@ -223,10 +218,6 @@ fn radius(text: Option<&str>) -> Result<Option<f64>, Failure> {
 
 /// Reads a quantity from the command line.
 fn quantity(flag: &str, text: &str, kind: Kind) -> Result<f64, Failure> {
-    kind.parse(text).map_err(|error| {
-        Failure::usage(
-            ErrorCode::InvalidValue,
-            format_args!("{flag} {text}: {error}"),
-        )
-    })
+    kind.parse(text)
+        .map_err(|error| ErrorCode::InvalidValue.usage(format_args!("{flag} {text}: {error}")))
 }

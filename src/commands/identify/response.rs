@@ -121,12 +121,9 @@ fn motion_of(args: &Response, name: &str, unit: Option<&NamedUnit>) -> Result<Mo
         return Ok(motion);
     }
     if let Some(hint) = unit.and_then(gravity_hint) {
-        return Err(Failure::usage(
-            ErrorCode::UnitUnsuitable,
-            format_args!(
-                "--measured \"{name}\" is in g: {hint} (--measured-unit g0), and for a mass give --measured-as displacement"
-            ),
-        ));
+        return Err(ErrorCode::UnitUnsuitable.usage(format_args!(
+            "--measured \"{name}\" is in g: {hint} (--measured-unit g0), and for a mass give --measured-as displacement"
+        )));
     }
     let by_unit = unit.and_then(|unit| Motion::of(unit.unit.dimension()));
     Ok(by_unit.map_or(Motion::Displacement, |(motion, _)| motion))
@@ -187,13 +184,10 @@ fn scale(applied: &mut Channel, text: &str) -> Result<(), Failure> {
         FORCE => "N",
         TORQUE => "N m",
         _ => {
-            return Err(Failure::usage(
-                ErrorCode::UnitUnsuitable,
-                format_args!(
-                    "--torque-factor {text} is no torque or force per unit of a channel; expected one such as \
-                     \"444.4 N/V\""
-                ),
-            ));
+            return Err(ErrorCode::UnitUnsuitable.usage(format_args!(
+                "--torque-factor {text} is no torque or force per unit of a channel; expected one such as \
+                 \"444.4 N/V\""
+            )));
         }
     };
     applied.samples.iter_mut().for_each(|v| *v *= factor);
@@ -205,24 +199,21 @@ fn scale(applied: &mut Channel, text: &str) -> Result<(), Failure> {
 fn to_torque(force: &mut Channel, radius_m: f64) -> Result<(), Failure> {
     let unit = unit_or(force.recorded(), "--applied-unit")?;
     if unit.unit.dimension() != FORCE {
-        return Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
-            format_args!(
-                "--radius goes with a force; --applied \"{}\" is in {}{}",
-                force.name,
-                unit.text,
-                match (TransducerSignal::of(&unit.unit), unit.weight_as(FORCE)) {
-                    (Some(_), _) => {
-                        ": give the inverse of the sensitivity of the hammer as --torque-factor, such as \"444.4 N/V\" \
-                         for 2.25 mV/N, or leave --radius out for natural frequency and damping alone"
-                            .to_owned()
-                    }
-                    (None, Some(force)) =>
-                        format!(", a mass; if it is a force, give --applied-unit {force}"),
-                    (None, None) => String::new(),
+        return Err(ErrorCode::ConflictingArguments.usage(format_args!(
+            "--radius goes with a force; --applied \"{}\" is in {}{}",
+            force.name,
+            unit.text,
+            match (TransducerSignal::of(&unit.unit), unit.weight_as(FORCE)) {
+                (Some(_), _) => {
+                    ": give the inverse of the sensitivity of the hammer as --torque-factor, such as \"444.4 N/V\" \
+                     for 2.25 mV/N, or leave --radius out for natural frequency and damping alone"
+                        .to_owned()
                 }
-            ),
-        ));
+                (None, Some(force)) =>
+                    format!(", a mass; if it is a force, give --applied-unit {force}"),
+                (None, None) => String::new(),
+            }
+        )));
     }
     let factor = unit.unit.factor() * radius_m;
     force.samples.iter_mut().for_each(|v| *v *= factor);
@@ -358,14 +349,11 @@ fn rad_per_n_m(
     let first = of(&loaded[0]);
     match loaded.iter().position(|l| of(l) != first) {
         None => Ok(first),
-        Some(other) => Err(Failure::failed(
-            ErrorCode::RecordsDiffer,
-            format_args!(
-                "{} and {} have different units; records of one response need the same",
-                args.inputs[0].shown(),
-                args.inputs[other].shown()
-            ),
-        )),
+        Some(other) => Err(ErrorCode::RecordsDiffer.failed(format_args!(
+            "{} and {} have different units; records of one response need the same",
+            args.inputs[0].shown(),
+            args.inputs[other].shown()
+        ))),
     }
 }
 
@@ -379,7 +367,7 @@ fn entries(
     let mode = match &result.modes[..] {
         [mode] => mode.clone(),
         _ if args.findings.result.output.is_some() => {
-            return Err(Failure::failed(ErrorCode::UnsuitableRecord, NOT_AT_REST));
+            return Err(ErrorCode::UnsuitableRecord.failed(NOT_AT_REST));
         }
         _ => return Ok(Vec::new()),
     };

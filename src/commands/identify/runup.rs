@@ -26,16 +26,13 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
     let (motion, torque) = (&read.channels[0], &read.channels[1]);
     let motion_unit = unit_or(motion.recorded(), "--motion-unit")?;
     let (kind, turning) = Motion::of(motion_unit.unit.dimension()).ok_or_else(|| {
-        Failure::failed(
-            ErrorCode::UnitUnsuitable,
-            format_args!(
-                "the unit of the motion \"{}\" is \"{}\"; expected an angle, a length, or their first or second \
-                 derivative{}",
-                motion.name,
-                motion_unit.text,
-                gravity_hint(&motion_unit).map_or(String::new(), |hint| format!(": {hint}"))
-            ),
-        )
+        ErrorCode::UnitUnsuitable.failed(format_args!(
+            "the unit of the motion \"{}\" is \"{}\"; expected an angle, a length, or their first or second \
+             derivative{}",
+            motion.name,
+            motion_unit.text,
+            gravity_hint(&motion_unit).map_or(String::new(), |hint| format!(": {hint}"))
+        ))
     })?;
     let factors = [
         motion_unit.unit.factor(),
@@ -78,18 +75,16 @@ fn entries(args: &Runup, result: &Identification) -> Result<Vec<Entry>, Failure>
     let is_written = args.findings.result.output.is_some();
     let source = format!("identify runup: {}", args.input.shown());
     match result.get("inertia") {
-        Some(inertia) if inertia.value() <= 0.0 && is_written => Err(Failure::failed(
-            ErrorCode::NotIdentifiable,
-            format_args!(
+        Some(inertia) if inertia.value() <= 0.0 && is_written => {
+            Err(ErrorCode::NotIdentifiable.failed(format_args!(
                 "the fitted inertia is negative ({} kg m²) and is not written: check the sign of \"{}\" and \"{}\"",
                 short(inertia.value()),
                 args.motion,
                 args.torque
-            ),
-        )),
+            )))
+        }
         Some(inertia) => Ok(vec![entry("mechanics", "inertia", inertia, &source)]),
-        None if is_written => Err(Failure::failed(
-            ErrorCode::ConflictingArguments,
+        None if is_written => Err(ErrorCode::ConflictingArguments.failed(
             "a stand file cannot store a mass; omit -o, or record an angle and a torque",
         )),
         None => Ok(Vec::new()),
@@ -109,13 +104,11 @@ fn effort_factor(args: &Runup, torque: &Channel, turning: bool) -> Result<f64, F
     match (turning, dimension, radius) {
         (true, TORQUE, None) | (false, FORCE, None) => Ok(factor),
         (true, FORCE, Some(radius)) => Ok(factor * radius),
-        (true, FORCE, None) => Err(Failure::failed(
-            ErrorCode::MissingArgument,
+        (true, FORCE, None) => Err(ErrorCode::MissingArgument.failed(
             "a force on a rotating body needs a radius; give it with --radius",
         )),
-        (true, TORQUE, Some(_)) | (false, FORCE, Some(_)) => Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
-            format_args!(
+        (true, TORQUE, Some(_)) | (false, FORCE, Some(_)) => {
+            Err(ErrorCode::ConflictingArguments.usage(format_args!(
                 "--radius goes with a force on a rotating body; \"{}\" is a {} and \"{}\" {}: omit it",
                 torque.name,
                 if turning { "torque" } else { "force" },
@@ -125,23 +118,17 @@ fn effort_factor(args: &Runup, torque: &Channel, turning: bool) -> Result<f64, F
                 } else {
                     "a linear motion"
                 }
-            ),
-        )),
-        (false, TORQUE, _) => Err(Failure::failed(
-            ErrorCode::UnitUnsuitable,
-            format_args!(
-                "channel \"{}\" is a torque, but \"{}\" is a linear motion: give the force instead, or the motion as \
-                 an angle; for a drive of known ratio in between, give --torque-factor, such as \"50 N/(N m)\"",
-                torque.name, args.motion
-            ),
-        )),
-        (_, other, _) => Err(Failure::failed(
-            ErrorCode::UnitUnsuitable,
-            format_args!(
-                "channel \"{}\" is not a {} ({other}); give --torque-factor, such as \"35.15 N/V\"",
-                torque.name,
-                if turning { "torque" } else { "force" }
-            ),
-        )),
+            )))
+        }
+        (false, TORQUE, _) => Err(ErrorCode::UnitUnsuitable.failed(format_args!(
+            "channel \"{}\" is a torque, but \"{}\" is a linear motion: give the force instead, or the motion as \
+             an angle; for a drive of known ratio in between, give --torque-factor, such as \"50 N/(N m)\"",
+            torque.name, args.motion
+        ))),
+        (_, other, _) => Err(ErrorCode::UnitUnsuitable.failed(format_args!(
+            "channel \"{}\" is not a {} ({other}); give --torque-factor, such as \"35.15 N/V\"",
+            torque.name,
+            if turning { "torque" } else { "force" }
+        ))),
     }
 }

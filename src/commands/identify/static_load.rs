@@ -27,10 +27,8 @@ const ON_EARTH: std::ops::RangeInclusive<f64> = 9.76..=9.84;
 /// Runs the test.
 pub fn run(args: &Static) -> Result<Outcome, Failure> {
     if args.table.resample {
-        return Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
-            "--resample does not apply: a table of loads has no time axis",
-        ));
+        return Err(ErrorCode::ConflictingArguments
+            .usage("--resample does not apply: a table of loads has no time axis"));
     }
     // A table of loads has no time axis; a given rate prevents the search for one.
     let reading = Reading {
@@ -45,8 +43,7 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
     let result = identify(&points, args.degree, &units)?;
     let entries = entries(args, &result, &units);
     if entries.is_empty() && args.findings.result.output.is_some() {
-        return Err(Failure::failed(
-            ErrorCode::UnitUnsuitable,
+        return Err(ErrorCode::UnitUnsuitable.failed(
             "a stand file takes a calibration of torque, or the static_gain of a force without --degree; give the load as \
              a torque, or as a force or mass (with --radius for a torque), and the reading in V, mV/V, mA, Hz, ustrain \
              or N; or omit -o",
@@ -114,13 +111,10 @@ fn points(
     let is_signal =
         load_unit.unit.dimension() != FORCE && TransducerSignal::of(&load_unit.unit).is_some();
     if is_signal && is_effort {
-        return Err(Failure::usage(
-            ErrorCode::UnitUnsuitable,
-            format_args!(
-                "--load \"{}\" is in {} and --reading \"{}\" in {}; the columns are swapped",
-                args.load, load_unit.text, args.reading, unit.text
-            ),
-        ));
+        return Err(ErrorCode::UnitUnsuitable.usage(format_args!(
+            "--load \"{}\" is in {} and --reading \"{}\" in {}; the columns are swapped",
+            args.load, load_unit.text, args.reading, unit.text
+        )));
     }
     let (load_factor, load) = load_of(args, &load_unit)?;
     let (factor, reading) = reading_of(args, &unit)?;
@@ -143,11 +137,9 @@ fn points(
         .flatten()
         .any(|count| count != loads.len())
     {
-        return Err(Failure::failed(
-            ErrorCode::RecordsDiffer,
-            "the columns differ in length; each load needs a reading",
-        )
-        .at(args.input.shown()));
+        return Err(ErrorCode::RecordsDiffer
+            .failed("the columns differ in length; each load needs a reading")
+            .at(args.input.shown()));
     }
     let point = |i: usize| Point {
         load: loads[i],
@@ -174,14 +166,11 @@ fn stds(
     let channel = recording.channel(choice)?;
     let (unit, _) = unit_of(choice, &channel.heading, channel.unit.as_ref())?;
     let refused = |text: &str| {
-        Failure::usage(
-            ErrorCode::UnitUnsuitable,
-            format_args!(
-                "--std \"{}\" is in \"{text}\" and --reading \"{}\" in {}; write the standard uncertainty of each reading in the \
-                 unit of the readings (0.1 % of 2 V is 0.002 V; one of the load, times the sensitivity)",
-                channel.name, args.reading, reading_unit.text
-            ),
-        )
+        ErrorCode::UnitUnsuitable.usage(format_args!(
+            "--std \"{}\" is in \"{text}\" and --reading \"{}\" in {}; write the standard uncertainty of each reading in the \
+             unit of the readings (0.1 % of 2 V is 0.002 V; one of the load, times the sensitivity)",
+            channel.name, args.reading, reading_unit.text
+        ))
     };
     let factor = match (&unit, channel.unit_text.as_deref()) {
         (None, _) if channel.name.contains('%') => return Err(refused("%")),
@@ -197,14 +186,11 @@ fn stds(
         }
     };
     match channel.samples.iter().position(|s| s.is_nan() || *s <= 0.0) {
-        Some(i) => Err(Failure::failed(
-            ErrorCode::InvalidSample,
-            format_args!(
-                "row {} of {}: the standard uncertainty must be greater than 0",
-                i + 1,
-                args.input.shown()
-            ),
-        )),
+        Some(i) => Err(ErrorCode::InvalidSample.failed(format_args!(
+            "row {} of {}: the standard uncertainty must be greater than 0",
+            i + 1,
+            args.input.shown()
+        ))),
         None => Ok(Some(channel.samples.iter().map(|s| s * factor).collect())),
     }
 }
@@ -253,15 +239,14 @@ fn column(
 /// Rejects a gravity that occurs nowhere on Earth.
 fn on_earth(gravity: Option<f64>, text: Option<&str>) -> Result<(), Failure> {
     match (gravity, text) {
-        (Some(value), Some(text)) if !ON_EARTH.contains(&value) => Err(Failure::usage(
-            ErrorCode::InvalidValue,
-            format_args!(
+        (Some(value), Some(text)) if !ON_EARTH.contains(&value) => {
+            Err(ErrorCode::InvalidValue.usage(format_args!(
                 "--gravity {text}: gravity on the ground is between {} and {} m/s^2 (9.780 at the equator, 9.832 at the poles); \
                  give the local one, as --gravity \"9.81 m/s^2\"",
                 ON_EARTH.start(),
                 ON_EARTH.end()
-            ),
-        )),
+            )))
+        }
         _ => Ok(()),
     }
 }
@@ -271,23 +256,17 @@ fn refuse_unclear_weight(args: &Static, unit: &NamedUnit) -> Result<(), Failure>
     if unit.unit.has_bare_weight()
         && let Some([force, mass]) = Unit::readings_of_weight(&unit.text)
     {
-        return Err(Failure::usage(
-            ErrorCode::UnitUnclear,
-            format_args!(
-                "--load \"{}\" is in \"{}\", which can be read with a force or with a mass; give --load-unit \
-                 \"{force}\" or --load-unit \"{mass}\"",
-                args.load, unit.text
-            ),
-        ));
+        return Err(ErrorCode::UnitUnclear.usage(format_args!(
+            "--load \"{}\" is in \"{}\", which can be read with a force or with a mass; give --load-unit \
+             \"{force}\" or --load-unit \"{mass}\"",
+            args.load, unit.text
+        )));
     }
     if let Some(force) = unit.weight_as(TORQUE) {
-        return Err(Failure::usage(
-            ErrorCode::UnitUnclear,
-            format_args!(
-                "--load \"{}\" is in \"{}\", a mass times a length; if it is a torque, give --load-unit \"{force}\"",
-                args.load, unit.text
-            ),
-        ));
+        return Err(ErrorCode::UnitUnclear.usage(format_args!(
+            "--load \"{}\" is in \"{}\", a mass times a length; if it is a torque, give --load-unit \"{force}\"",
+            args.load, unit.text
+        )));
     }
     Ok(())
 }
@@ -303,37 +282,28 @@ fn load_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
     refuse_unclear_weight(args, unit)?;
     let is_mass = unit.unit.dimension() == MASS;
     if gravity.is_some() && !is_mass {
-        return Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
-            format_args!(
-                "--gravity goes with a load that is a mass; \"{}\" is in {}",
-                args.load, unit.text
-            ),
-        ));
+        return Err(ErrorCode::ConflictingArguments.usage(format_args!(
+            "--gravity goes with a load that is a mass; \"{}\" is in {}",
+            args.load, unit.text
+        )));
     }
     match (unit.unit.dimension(), radius) {
         (TORQUE, None) => Ok((factor, "N m".to_owned())),
         (FORCE, Some(radius)) => Ok((factor * radius, "N m".to_owned())),
         (FORCE, None) => Ok((factor, "N".to_owned())),
         (_, radius) if is_mass => match (gravity, radius) {
-            (None, _) => Err(Failure::usage(
-                ErrorCode::MissingArgument,
-                format_args!(
-                    "--load \"{}\" is in {}, a mass; give the local gravity, as --gravity \"9.81 m/s^2\" (9.780 \
-                     m/s^2 at the equator, 9.832 at the poles)",
-                    args.load, unit.text
-                ),
-            )),
+            (None, _) => Err(ErrorCode::MissingArgument.usage(format_args!(
+                "--load \"{}\" is in {}, a mass; give the local gravity, as --gravity \"9.81 m/s^2\" (9.780 \
+                 m/s^2 at the equator, 9.832 at the poles)",
+                args.load, unit.text
+            ))),
             (Some(gravity), Some(radius)) => Ok((factor * gravity * radius, "N m".to_owned())),
             (Some(gravity), None) => Ok((factor * gravity, "N".to_owned())),
         },
-        (_, Some(_)) => Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
-            format_args!(
-                "--radius goes with a load that is a force or a mass; \"{}\" is in {}",
-                args.load, unit.text
-            ),
-        )),
+        (_, Some(_)) => Err(ErrorCode::ConflictingArguments.usage(format_args!(
+            "--radius goes with a load that is a force or a mass; \"{}\" is in {}",
+            args.load, unit.text
+        ))),
         (_, None) => Ok((1.0, unit.text.clone())),
     }
 }
@@ -346,14 +316,11 @@ fn reading_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure>
     }
     if unit.unit.ratio_of() == Some(RatioOf::Anything) {
         let text = &unit.text;
-        return Err(Failure::usage(
-            ErrorCode::UnitUnclear,
-            format_args!(
-                "--reading \"{}\" is in \"{text}\", which could be a ratio of voltages or a strain; give \
-                 --reading-unit \"{text} V/V\" or \"{text} strain\"",
-                args.reading
-            ),
-        ));
+        return Err(ErrorCode::UnitUnclear.usage(format_args!(
+            "--reading \"{}\" is in \"{text}\", which could be a ratio of voltages or a strain; give \
+             --reading-unit \"{text} V/V\" or \"{text} strain\"",
+            args.reading
+        )));
     }
     Ok((1.0, unit.text.clone()))
 }

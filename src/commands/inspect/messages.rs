@@ -146,11 +146,11 @@ impl<'a> Numbers<'a> {
 fn keep_topic(inventory: &mut Inventory, wanted: &str) -> Result<(), Failure> {
     inventory.channels.retain(|channel| channel.topic == wanted);
     if inventory.channels.is_empty() {
-        return Err(Failure::failed(
-            ErrorCode::ChannelNotFound,
-            format_args!("there is no topic {wanted}; omit --topic to see all"),
-        )
-        .at(&inventory.file));
+        return Err(ErrorCode::ChannelNotFound
+            .failed(format_args!(
+                "there is no topic {wanted}; omit --topic to see all"
+            ))
+            .at(&inventory.file));
     }
     Ok(())
 }

@@ -87,16 +87,12 @@ fn compare(args: &Inspect) -> Result<(Made, Vec<Failure>), Failure> {
 /// Rejects impossible requests.
 fn check(args: &Inspect) -> Result<(), Failure> {
     if args.files.iter().filter(|file| is_dash(file)).count() > 1 {
-        return Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
-            "standard input can be read only once; name files",
-        ));
+        return Err(ErrorCode::ConflictingArguments
+            .usage("standard input can be read only once; name files"));
     }
     if args.reading.resample {
-        return Err(Failure::usage(
-            ErrorCode::ConflictingArguments,
-            "--resample does not apply: inspect shows recordings as they are",
-        ));
+        return Err(ErrorCode::ConflictingArguments
+            .usage("--resample does not apply: inspect shows recordings as they are"));
     }
     Ok(())
 }

@@ -48,13 +48,10 @@ pub(super) fn no_mode(lines: &[SteadyLine]) -> Failure {
             listed(lines)
         ),
     };
-    Failure::failed(
-        ErrorCode::NotIdentifiable,
-        format_args!(
-            "no decaying sine stands out from the noise{but}; check the channel, or cut the record to the decay with \
-             --range (a stand that is damped so much that it does not swing gives no decay: use identify response)"
-        ),
-    )
+    ErrorCode::NotIdentifiable.failed(format_args!(
+        "no decaying sine stands out from the noise{but}; check the channel, or cut the record to the decay with \
+         --range (a stand that is damped so much that it does not swing gives no decay: use identify response)"
+    ))
 }
 
 /// Maximum number of restarts listed.

@@ -262,14 +262,11 @@ impl Cuts {
             ));
         }
         if self.stretches.is_empty() {
-            return Err(Failure::failed(
-                ErrorCode::NotIdentifiable,
-                if left_clipped > 0 {
-                    "no free decay is left after the last clipped sample; record with a larger range"
-                } else {
-                    "no free decay found; try another channel or --range"
-                },
-            ));
+            return Err(ErrorCode::NotIdentifiable.failed(if left_clipped > 0 {
+                "no free decay is left after the last clipped sample; record with a larger range"
+            } else {
+                "no free decay found; try another channel or --range"
+            }));
         }
         if found > MOST_STRETCHES {
             result.warn(
@@ -372,24 +369,20 @@ fn ringing(values: &[f64], range: &Range<usize>, is_uniform: bool) -> Range<usiz
 /// Rejects a record that is too short or has gaps.
 fn check(record: &Ringing) -> Result<(), Failure> {
     if let Some(i) = record.values.iter().position(|v| !v.is_finite()) {
-        return Err(Failure::failed(
-            ErrorCode::InvalidSample,
-            format_args!(
+        return Err(ErrorCode::InvalidSample
+            .failed(format_args!(
                 "sample {} is not a finite number; exclude it with --range",
                 i + 1
-            ),
-        )
-        .at(record.name));
+            ))
+            .at(record.name));
     }
     if record.values.len() < LEAST_SAMPLES {
-        return Err(Failure::failed(
-            ErrorCode::TooFewSamples,
-            format_args!(
+        return Err(ErrorCode::TooFewSamples
+            .failed(format_args!(
                 "{} samples are too few for a decay; at least {LEAST_SAMPLES} are needed",
                 record.values.len()
-            ),
-        )
-        .at(record.name));
+            ))
+            .at(record.name));
     }
     Ok(())
 }

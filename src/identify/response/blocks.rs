@@ -290,7 +290,7 @@ fn good_hits(
              any record as it is"
                 .to_owned(),
         );
-        return Err(Failure::failed(ErrorCode::TooFewSamples, bad.join("; ")));
+        return Err(ErrorCode::TooFewSamples.failed(bad.join("; ")));
     }
     check::overlapping_hits(result, left);
     for message in bad {
@@ -339,14 +339,11 @@ fn random(
         all.extend(cut.into_iter().map(|block| (r, block)));
     }
     if all.len() < 4 {
-        return Err(Failure::failed(
-            ErrorCode::TooFewSamples,
-            format_args!(
-                "only {} of {length} samples in the records, at least 4 are needed; choose a shorter --segment, or \
-                 record longer",
-                plural(all.len(), "segment")
-            ),
-        ));
+        return Err(ErrorCode::TooFewSamples.failed(format_args!(
+            "only {} of {length} samples in the records, at least 4 are needed; choose a shorter --segment, or \
+             record longer",
+            plural(all.len(), "segment")
+        )));
     }
     result.method.push(format!(
         "Hann-weighted segments of {length} samples, 50 % overlap"
@@ -364,18 +361,14 @@ fn periodic(
         .period
         .or_else(|| frf::find_period(records[0].applied));
     let period = period.ok_or_else(|| {
-        Failure::failed(
-            ErrorCode::TooFewSamples,
+        ErrorCode::TooFewSamples.failed(
             "no period found in the applied signal; give it with --period, or --excitation random",
         )
     })?;
     if period < 2 {
-        return Err(Failure::usage(
-            ErrorCode::InvalidValue,
-            format_args!(
-                "--period {period}: a period has two samples or more; count them in one period of the excitation"
-            ),
-        ));
+        return Err(ErrorCode::InvalidValue.usage(format_args!(
+            "--period {period}: a period has two samples or more; count them in one period of the excitation"
+        )));
     }
     let mut all = Vec::new();
     for (r, record) in records.iter().enumerate() {
@@ -395,10 +388,9 @@ fn periodic(
         all.extend(cut.into_iter().map(|block| (r, block)));
     }
     if all.is_empty() {
-        return Err(Failure::failed(
-            ErrorCode::TooFewSamples,
-            format_args!("the records are shorter than one period of {period} samples"),
-        ));
+        return Err(ErrorCode::TooFewSamples.failed(format_args!(
+            "the records are shorter than one period of {period} samples"
+        )));
     }
     result
         .method

@@ -13,42 +13,33 @@ use torqcomp_dsp::frf::{Estimator, Window};
 pub(super) fn records(records: &[Driven]) -> Result<(), Failure> {
     let first = records
         .first()
-        .ok_or_else(|| Failure::failed(ErrorCode::MissingArgument, "no record given"))?;
+        .ok_or_else(|| ErrorCode::MissingArgument.failed("no record given"))?;
     for record in records {
         if (record.rate_hz / first.rate_hz - 1.0).abs() > 1e-6 {
-            return Err(Failure::failed(
-                ErrorCode::RecordsDiffer,
-                format_args!(
-                    "{} was sampled at {} Hz and {} at {} Hz; records of one response need the same rate",
-                    first.name,
-                    short(first.rate_hz),
-                    record.name,
-                    short(record.rate_hz)
-                ),
-            ));
+            return Err(ErrorCode::RecordsDiffer.failed(format_args!(
+                "{} was sampled at {} Hz and {} at {} Hz; records of one response need the same rate",
+                first.name,
+                short(first.rate_hz),
+                record.name,
+                short(record.rate_hz)
+            )));
         }
         let mut numbers = record.applied.iter().chain(record.measured);
         if record.applied.len() != record.measured.len() || numbers.any(|v| !v.is_finite()) {
-            return Err(Failure::failed(
-                ErrorCode::InvalidSample,
-                "both channels need a number in every row",
-            )
-            .at(record.name));
+            return Err(ErrorCode::InvalidSample
+                .failed("both channels need a number in every row")
+                .at(record.name));
         }
         for (what, samples) in [("applied", record.applied), ("measured", record.measured)] {
             if samples.iter().all(|v| *v == samples[0]) {
-                return Err(Failure::failed(
-                    ErrorCode::UnsuitableRecord,
-                    format_args!(
-                        "the {what} channel does not change; check --{what} and whether the recorder was connected"
-                    ),
-                )
+                return Err(ErrorCode::UnsuitableRecord.failed(format_args!(
+                    "the {what} channel does not change; check --{what} and whether the recorder was connected"
+                ))
                 .at(record.name));
             }
         }
         if record.applied == record.measured {
-            return Err(Failure::failed(
-                ErrorCode::UnsuitableRecord,
+            return Err(ErrorCode::UnsuitableRecord.failed(
                 "the applied and the measured channel are the same numbers; check --applied and --measured",
             )
             .at(record.name));

@@ -92,16 +92,13 @@ pub(super) fn none(data: &Data, above: Option<&Pole>, is_given: bool) -> Failure
         true => "raise the upper end of --band, ",
         false => "",
     };
-    Failure::failed(
-        ErrorCode::NotIdentifiable,
-        format_args!(
-            "the response shows no resonance up to {} Hz, where the excitation or the band ends{fitted}: only the static \
-             gain is in these data; {band}excite higher frequencies (a harder hammer tip, faster steps, a sweep to above \
-             the resonance), or take natural frequency and damping from a free decay (identify decay) and the \
-             calibration from known loads (identify static)",
-            rounded(data.band_rad_per_s().1 / TAU, 3)
-        ),
-    )
+    ErrorCode::NotIdentifiable.failed(format_args!(
+        "the response shows no resonance up to {} Hz, where the excitation or the band ends{fitted}: only the static \
+         gain is in these data; {band}excite higher frequencies (a harder hammer tip, faster steps, a sweep to above \
+         the resonance), or take natural frequency and damping from a free decay (identify decay) and the \
+         calibration from known loads (identify static)",
+        rounded(data.band_rad_per_s().1 / TAU, 3)
+    ))
 }
 
 /// The fit without modes whose damping is not identifiable from these records: they are caused by noise and
@@ -125,7 +122,7 @@ fn damped(
             return Ok(fitted);
         };
         if starts.len() == 1 {
-            return Err(Failure::failed(ErrorCode::NotIdentifiable, foreign::NONE));
+            return Err(ErrorCode::NotIdentifiable.failed(foreign::NONE));
         }
         starts = fitted.poles;
         left_out.push(rounded(starts.remove(undamped).frequency_hz(), 5));

@@ -147,7 +147,7 @@ pub(super) fn warn(
     is_written: bool,
 ) -> Result<(), Failure> {
     if is_written && modal.poles.iter().all(|pole| pole.rate_per_s == 0.0) {
-        return Err(Failure::failed(ErrorCode::NotIdentifiable, NONE));
+        return Err(ErrorCode::NotIdentifiable.failed(NONE));
     }
     let of_kind = |kind: Foreign| -> Vec<String> {
         let all = modal.poles.iter().zip(&modal.foreign);

@@ -53,14 +53,11 @@ fn band(set: &Set, options: &ResponseOptions) -> Result<Lines, Failure> {
     };
     let range = from.max(1)..to.min(lines - 1);
     if range.len() < 12 {
-        return Err(Failure::failed(
-            ErrorCode::TooFewSamples,
-            format_args!(
-                "only {} in the band, {} Hz apart: too few to fit modes; widen --band or record longer",
-                plural(range.len(), "line"),
-                short(set.step_hz)
-            ),
-        ));
+        return Err(ErrorCode::TooFewSamples.failed(format_args!(
+            "only {} in the band, {} Hz apart: too few to fit modes; widen --band or record longer",
+            plural(range.len(), "line"),
+            short(set.step_hz)
+        )));
     }
     Ok(range)
 }

@@ -150,7 +150,7 @@ fn evaluate(
         (found, whole.join().expect("a transform does not panic"))
     });
     let (coarse, held_out) = found.map_err(|failure| match leads {
-        true => Failure::failed(ErrorCode::UnsuitableRecord, check::LEADS),
+        true => ErrorCode::UnsuitableRecord.failed(check::LEADS),
         false => failure,
     })?;
     let asked = options.lag;
@@ -174,7 +174,7 @@ fn evaluate(
     let options = &options.with_lag_of(Some(&fitted.modal));
     shift::warn(&mut result, &fitted.modal, asked);
     if leads && check::is_out_of_reach(&set, &fitted.modal) {
-        return Err(Failure::failed(ErrorCode::UnsuitableRecord, check::LEADS));
+        return Err(ErrorCode::UnsuitableRecord.failed(check::LEADS));
     }
     determined::must_reach((&set, &data), &fitted, options.band_hz.is_some())?;
     foreign::warn(&mut result, &fitted.modal, is_grounded)?;

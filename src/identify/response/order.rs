@@ -74,16 +74,13 @@ pub(super) fn order(
     let folds = folds(set);
     if lines.len() > MOST_LINES {
         let (from, to) = lines::strongest(set, lines);
-        return Err(Failure::failed(
-            ErrorCode::TooManySamples,
-            format_args!(
-                "{} lines in the band, more than {MOST_LINES}; narrow it to where the response is strongest: \
-             --band {}..{}",
-                lines.len(),
-                rounded(from as f64 * set.step_hz, 4),
-                rounded(to as f64 * set.step_hz, 4)
-            ),
-        ));
+        return Err(ErrorCode::TooManySamples.failed(format_args!(
+            "{} lines in the band, more than {MOST_LINES}; narrow it to where the response is strongest: \
+         --band {}..{}",
+            lines.len(),
+            rounded(from as f64 * set.step_hz, 4),
+            rounded(to as f64 * set.step_hz, 4)
+        )));
     }
     if let Some(modes) = options.modes {
         let all = grown(data, options, modes)?;
@@ -120,7 +117,7 @@ fn one_block(said: &[Warning]) -> Failure {
              or give the number, as --modes 1 for a single resonance"
         }
     });
-    Failure::failed(ErrorCode::TooFewSamples, all.join("; "))
+    ErrorCode::TooFewSamples.failed(all.join("; "))
 }
 
 /// The number of modes, one or more, with the smallest hold-out error.
@@ -142,8 +139,7 @@ pub(super) fn is_unexplained(errors: &[f64]) -> bool {
 }
 
 pub(super) fn unexplained() -> Failure {
-    Failure::failed(
-        ErrorCode::NotIdentifiable,
+    ErrorCode::NotIdentifiable.failed(
         "no mode explains hold-out data: the measured signal does not follow the applied one; check --applied, \
          --measured and --band",
     )

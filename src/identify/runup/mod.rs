@@ -109,14 +109,11 @@ fn given_half(seconds: f64, run: &FreeRun) -> Result<usize, Failure> {
     let half = (seconds * run.rate_hz).round();
     match (LEAST_HALF as f64..=most as f64).contains(&half) {
         true => Ok(half as usize),
-        false => Err(Failure::usage(
-            ErrorCode::InvalidValue,
-            format_args!(
-                "--window {seconds}: expected a half-width from {} s, {LEAST_HALF} samples, to {} s, half of the record",
-                short(LEAST_HALF as f64 / run.rate_hz),
-                short(most as f64 / run.rate_hz)
-            ),
-        )),
+        false => Err(ErrorCode::InvalidValue.usage(format_args!(
+            "--window {seconds}: expected a half-width from {} s, {LEAST_HALF} samples, to {} s, half of the record",
+            short(LEAST_HALF as f64 / run.rate_hz),
+            short(most as f64 / run.rate_hz)
+        ))),
     }
 }
 

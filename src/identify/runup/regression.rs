@@ -51,13 +51,10 @@ pub(super) fn solve(
     let b = DVector::from_fn(all, |r, _| kept(r, right[r]));
     let sizes: Vec<f64> = scaled.column_iter().map(|c| c.norm()).collect();
     if let Some(i) = sizes.iter().position(|s| *s == 0.0 || !s.is_finite()) {
-        return Err(Failure::failed(
-            ErrorCode::NotIdentifiable,
-            format_args!(
-                "the {} term of the equation of motion is zero throughout the record",
-                names[i].replace('_', " ")
-            ),
-        ));
+        return Err(ErrorCode::NotIdentifiable.failed(format_args!(
+            "the {} term of the equation of motion is zero throughout the record",
+            names[i].replace('_', " ")
+        )));
     }
     for (mut column, size) in scaled.column_iter_mut().zip(&sizes) {
         column.unscale_mut(*size);
@@ -131,8 +128,7 @@ pub(super) fn left_side(columns: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
 }
 
 pub(super) fn not_identifiable() -> Failure {
-    Failure::failed(
-        ErrorCode::NotIdentifiable,
+    ErrorCode::NotIdentifiable.failed(
         "the terms of the equation of motion are not separately identifiable from this record: at one constant torque, \
          or coasting alone, any multiple of inertia and friction fits; the torque must vary, with speeds and \
          accelerations that stand out of the noise",

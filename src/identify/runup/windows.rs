@@ -69,14 +69,11 @@ impl WindowRows {
         let moves = none(&directions.moves, false);
         let places = moves.iter().filter(|m| **m).count();
         if places < LEAST_WINDOWS {
-            return Err(Failure::failed(
-                ErrorCode::TooFewSamples,
-                format_args!(
-                    "as far as the noise of the motion shows, the body moves throughout only {} for windows of \
-                     ±{half} samples; choose a shorter --window",
-                    plural(places, "place")
-                ),
-            ));
+            return Err(ErrorCode::TooFewSamples.failed(format_args!(
+                "as far as the noise of the motion shows, the body moves throughout only {} for windows of \
+                 ±{half} samples; choose a shorter --window",
+                plural(places, "place")
+            )));
         }
         let column = |samples: &[f64], order: usize| -> Vec<f64> {
             let average = |c: &usize| window.at(samples, *c, order);

@@ -29,16 +29,13 @@ pub(super) fn continuous<'a>(run: &FreeRun<'a>) -> Result<(Cow<'a, [f64]>, usize
     for (i, step) in steps().enumerate() {
         let whole = (step / TAU).round();
         if (step - TAU * whole).abs() > CONTINUOUS {
-            return Err(Failure::failed(
-                ErrorCode::UnsuitableRecord,
-                format_args!(
-                    "the angle jumps by {} rad between samples {} and {}: it wraps and cannot be made continuous; \
-                     record it continuously or at a higher rate, and without interpolation over the wraps",
-                    rounded(step, 4),
-                    i + 1,
-                    i + 2
-                ),
-            ));
+            return Err(ErrorCode::UnsuitableRecord.failed(format_args!(
+                "the angle jumps by {} rad between samples {} and {}: it wraps and cannot be made continuous; \
+                 record it continuously or at a higher rate, and without interpolation over the wraps",
+                rounded(step, 4),
+                i + 1,
+                i + 2
+            )));
         }
         if whole != 0.0 {
             (turns, wraps) = (turns - whole, wraps + 1);

@@ -93,18 +93,15 @@ pub(super) fn refuse_mixed(points: &[Point]) -> Result<(), Failure> {
     for (flag, groups) in columns {
         let open = groups.most_open();
         if open > MOST_OPEN {
-            return Err(Failure::failed(
-                ErrorCode::UnsuitableRecord,
-                format_args!(
-                    "--{flag}: the rows of {open} different numbers are interleaved (at most {MOST_OPEN}); check that \
-                     the column numbers the {}, and sort the rows in the order in which they were taken",
-                    if flag == "series" {
-                        "series"
-                    } else {
-                        "mountings"
-                    }
-                ),
-            ));
+            return Err(ErrorCode::UnsuitableRecord.failed(format_args!(
+                "--{flag}: the rows of {open} different numbers are interleaved (at most {MOST_OPEN}); check that \
+                 the column numbers the {}, and sort the rows in the order in which they were taken",
+                if flag == "series" {
+                    "series"
+                } else {
+                    "mountings"
+                }
+            )));
         }
     }
     Ok(())

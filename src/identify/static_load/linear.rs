@@ -78,15 +78,12 @@ pub(super) fn refuse_two_ranges(points: &[Point], steps: &LoadSteps) -> Result<(
     if two_ranges > TWO_RANGES.powi(2) * one_range || (ratio - 1.0).abs() < LEAST_CHANGE {
         return Ok(());
     }
-    Err(Failure::failed(
-        ErrorCode::UnsuitableRecord,
-        format_args!(
-            "the sensitivity jumps: at loads of {} and above it is {} times that at smaller loads, as with two ranges \
-             of an amplifier; record all loads in one range, or evaluate the rows of each range separately",
-            rounded(from, 4),
-            rounded(ratio, 3)
-        ),
-    ))
+    Err(ErrorCode::UnsuitableRecord.failed(format_args!(
+        "the sensitivity jumps: at loads of {} and above it is {} times that at smaller loads, as with two ranges \
+         of an amplifier; record all loads in one range, or evaluate the rows of each range separately",
+        rounded(from, 4),
+        rounded(ratio, 3)
+    )))
 }
 
 /// Warns about readings that deviate from a curve of this degree.

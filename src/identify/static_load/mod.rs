@@ -127,20 +127,16 @@ fn one_weight(points: &[Point], degree: usize, steps: &LoadSteps) -> Result<bool
             1 => format!(", or one load on and off ({ONE_WEIGHT} rows or more)"),
             _ => String::new(),
         };
-        return Err(Failure::failed(
-            ErrorCode::TooFewSamples,
-            format_args!(
-                "{} in {} are too few for a curve of degree {degree} and its error; apply at least {}, including no \
-                 load{or}",
-                plural(count, "different load"),
-                plural(points.len(), "row"),
-                degree + 2
-            ),
-        ));
+        return Err(ErrorCode::TooFewSamples.failed(format_args!(
+            "{} in {} are too few for a curve of degree {degree} and its error; apply at least {}, including no \
+             load{or}",
+            plural(count, "different load"),
+            plural(points.len(), "row"),
+            degree + 2
+        )));
     }
     if points.iter().all(|p| p.reading == points[0].reading) {
-        return Err(Failure::failed(
-            ErrorCode::NotIdentifiable,
+        return Err(ErrorCode::NotIdentifiable.failed(
             "the reading does not change with load; check --reading and the bridge supply",
         ));
     }
@@ -258,7 +254,7 @@ fn follows(
         return Ok(());
     }
     if let Some(off) = outlier::off_line(points, of_rows, units) {
-        return Err(Failure::failed(ErrorCode::NotIdentifiable, off));
+        return Err(ErrorCode::NotIdentifiable.failed(off));
     }
     let empty: Vec<&Point> = zero::without_load(points, largest).collect();
     let zero = empty.iter().map(|p| p.reading).sum::<f64>() / empty.len().max(1) as f64;
@@ -271,13 +267,10 @@ fn follows(
             "check that the columns are the right ones and the rows in the order in which they were taken"
         }
     };
-    Err(Failure::failed(
-        ErrorCode::NotIdentifiable,
-        format_args!(
-            "the reading does not follow the load: the sensitivity differs from zero by less than {FOLLOWS} standard \
-         uncertainties; {why}"
-        ),
-    ))
+    Err(ErrorCode::NotIdentifiable.failed(format_args!(
+        "the reading does not follow the load: the sensitivity differs from zero by less than {FOLLOWS} standard \
+     uncertainties; {why}"
+    )))
 }
 
 /// Correlation of the magnitudes of loads and readings above which wrong signs are suspected.

@@ -163,8 +163,7 @@ impl Inventory {
 /// If there are several, or none, or the file can only be read once.
 pub(super) fn only_topic(input: &Input) -> Result<FieldRequest, Failure> {
     if *input == Input::Stdin {
-        return Err(Failure::usage(
-            ErrorCode::MissingArgument,
+        return Err(ErrorCode::MissingArgument.usage(
             "choose what to read from standard input with --topic, as --topic /joint_states \
              --field effort[0]",
         ));
@@ -211,9 +210,8 @@ fn choose_topic(file: &str, mut topics: Vec<TopicNumbers>) -> Result<FieldReques
     let names: Vec<_> = with_numbers.map(|(topic, _)| topic.as_str()).collect();
     match names[..] {
         [topic] => Ok(FieldRequest::Topic(topic.to_owned(), Vec::new())),
-        [] => Err(Failure::failed(
-            ErrorCode::NotARecording,
-            format_args!(
+        [] => Err(ErrorCode::NotARecording
+            .failed(format_args!(
                 "there is no topic whose numbers can be read{}",
                 topics
                     .iter()
@@ -222,17 +220,14 @@ fn choose_topic(file: &str, mut topics: Vec<TopicNumbers>) -> Result<FieldReques
                         Some(format!("; {topic}: {why}"))
                     })
                     .collect::<String>()
-            ),
-        )
-        .at(file)),
-        _ => Err(Failure::usage(
-            ErrorCode::ChannelUnclear,
-            format_args!(
+            ))
+            .at(file)),
+        _ => Err(ErrorCode::ChannelUnclear
+            .usage(format_args!(
                 "choose a topic with --topic; there are: {}",
                 names.join(", ")
-            ),
-        )
-        .at(file)),
+            ))
+            .at(file)),
     }
 }
 

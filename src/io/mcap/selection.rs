@@ -34,27 +34,21 @@ impl FieldChoice {
     pub fn check(&self) -> Result<FieldRequest, Failure> {
         let field = self.field.as_deref().unwrap_or("");
         match (&self.signal, &self.topic) {
-            (Some(_), Some(_)) => Err(Failure::usage(
-                ErrorCode::ConflictingArguments,
+            (Some(_), Some(_)) => Err(ErrorCode::ConflictingArguments.usage(
                 "--signal names topic and field in one: give either --signal or --topic with \
                  --field",
             )),
-            (Some(_), None) if self.field.is_some() => Err(Failure::usage(
-                ErrorCode::ConflictingArguments,
-                "--signal names topic and field in one: omit --field",
-            )),
+            (Some(_), None) if self.field.is_some() => Err(ErrorCode::ConflictingArguments
+                .usage("--signal names topic and field in one: omit --field")),
             (Some(signal), None) => Ok(FieldRequest::Signal(signal.clone())),
             (None, Some(topic)) => {
                 let parts = path::parse(field);
-                let parts = parts.map_err(|why| {
-                    Failure::usage(ErrorCode::InvalidValue, format_args!("--field: {why}"))
-                })?;
+                let parts = parts
+                    .map_err(|why| ErrorCode::InvalidValue.usage(format_args!("--field: {why}")))?;
                 Ok(FieldRequest::Topic(topic.clone(), parts))
             }
-            (None, None) if self.field.is_some() => Err(Failure::usage(
-                ErrorCode::MissingArgument,
-                "--field needs the topic it is in: add --topic, as --topic /joint_states",
-            )),
+            (None, None) if self.field.is_some() => Err(ErrorCode::MissingArgument
+                .usage("--field needs the topic it is in: add --topic, as --topic /joint_states")),
             (None, None) => Ok(FieldRequest::Only),
         }
     }

@@ -109,11 +109,9 @@ impl TopicSignal {
         let topic = &channel.record.topic;
         let signal = Self::new(name, channel, field, message, options);
         Some(signal.map_err(|why| {
-            Failure::failed(
-                ErrorCode::ChannelNotFound,
-                format_args!("topic {topic}: {why}"),
-            )
-            .at(name)
+            ErrorCode::ChannelNotFound
+                .failed(format_args!("topic {topic}: {why}"))
+                .at(name)
         }))
     }
 
@@ -192,11 +190,9 @@ impl TopicSignal {
         self.publishers.note(message).map_err(|others| {
             let why = two_publishers(others);
             let topic = &self.selected.topic;
-            Failure::failed(
-                ErrorCode::RecordsDiffer,
-                format_args!("topic {topic}: {why}"),
-            )
-            .at(&self.name)
+            ErrorCode::RecordsDiffer
+                .failed(format_args!("topic {topic}: {why}"))
+                .at(&self.name)
         })?;
         if self.is_time_chosen {
             self.decode(message);
@@ -234,15 +230,12 @@ impl TopicSignal {
             TimeChoice::Log => "",
             _ => ", or use --time log if the log times do not",
         };
-        Failure::failed(
-            ErrorCode::RecordsDiffer,
-            format_args!(
-                "topic {}: {} starts again, after {latest_ns} ns at {first_ns} ns, as where a simulation is reset or two \
-                 files were joined: the samples of both runs would be mixed; split the file there{remedy}",
-                self.selected.topic,
-                used.field.as_deref().unwrap_or("its time"),
-            ),
-        )
+        ErrorCode::RecordsDiffer.failed(format_args!(
+            "topic {}: {} starts again, after {latest_ns} ns at {first_ns} ns, as where a simulation is reset or two \
+             files were joined: the samples of both runs would be mixed; split the file there{remedy}",
+            self.selected.topic,
+            used.field.as_deref().unwrap_or("its time"),
+        ))
         .at(&self.name)
     }
 
@@ -306,11 +299,9 @@ impl TopicSignal {
         };
         one_frame(encoding, &schema, &self.route, data).map_err(|why| {
             let topic = &self.selected.topic;
-            Failure::failed(
-                ErrorCode::RecordsDiffer,
-                format_args!("topic {topic}: {why}"),
-            )
-            .at(&self.name)
+            ErrorCode::RecordsDiffer
+                .failed(format_args!("topic {topic}: {why}"))
+                .at(&self.name)
         })
     }
 
@@ -319,15 +310,13 @@ impl TopicSignal {
     fn choose_time(&mut self) -> Result<(), Failure> {
         let field = self.selected.time.field.take();
         if self.options.time == Some(TimeChoice::Header) && field.is_none() {
-            return Err(Failure::failed(
-                ErrorCode::TimeUnknown,
-                format_args!(
+            return Err(ErrorCode::TimeUnknown
+                .failed(format_args!(
                     "topic {}: its messages have no time stamp (header.stamp, stamp or timestamp); \
                  use --time log or --time publish",
                     self.selected.topic
-                ),
-            )
-            .at(&self.name));
+                ))
+                .at(&self.name));
         }
         let first = std::mem::take(&mut self.first);
         self.check_frames(&first)?;
@@ -448,9 +437,8 @@ fn is_ours(
     if channel.has_type_of(ours) {
         return Ok(Some(true));
     }
-    Err(Failure::failed(
-        ErrorCode::RecordsDiffer,
-        format_args!(
+    Err(ErrorCode::RecordsDiffer
+        .failed(format_args!(
             "the topic {} has channels of different types: channel {} is {} in {}, channel {} \
          is {} in {}; split the file by channel first",
             ours.record.topic,
@@ -460,7 +448,6 @@ fn is_ours(
             channel.record.id,
             channel.schema_name(),
             channel.record.message_encoding
-        ),
-    )
-    .at(name))
+        ))
+        .at(name))
 }

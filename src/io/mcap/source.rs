@@ -321,7 +321,7 @@ impl Pass {
         for loss in &self.records.losses().first {
             message.push_str(&format!("; {loss}"));
         }
-        Failure::failed(ErrorCode::ChannelNotFound, message)
+        ErrorCode::ChannelNotFound.failed(message)
     }
 
     fn summary(&self, signal: &TopicSignal) -> SignalSummary {

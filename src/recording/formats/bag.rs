@@ -39,5 +39,5 @@ fn read(bytes: &mut Bytes, _: &Reading) -> Result<Content, Failure> {
     } else {
         "this is an HDF5 file; export the channels as text, MATLAB 5 (-v7) or MCAP"
     };
-    Err(Failure::failed(ErrorCode::NotARecording, message))
+    Err(ErrorCode::NotARecording.failed(message))
 }

@@ -243,16 +243,13 @@ fn stated_rate(variables: &[Variable]) -> Result<Option<(String, f64)>, Failure>
             .find(|(_, rate)| (rate / first.1 - 1.0).abs() > 1e-6)
         {
             None => Ok(Some(first.clone())),
-            Some(other) => Err(Failure::failed(
-                ErrorCode::TimeUnknown,
-                format_args!(
-                    "\"{}\" and \"{}\" give two rates, {} and {} Hz; give the right one with --rate",
-                    first.0,
-                    other.0,
-                    digits::text(first.1, 6),
-                    digits::text(other.1, 6)
-                ),
-            )),
+            Some(other) => Err(ErrorCode::TimeUnknown.failed(format_args!(
+                "\"{}\" and \"{}\" give two rates, {} and {} Hz; give the right one with --rate",
+                first.0,
+                other.0,
+                digits::text(first.1, 6),
+                digits::text(other.1, 6)
+            ))),
         },
     }
 }
@@ -270,13 +267,10 @@ fn time_of(variables: &[Variable], reading: &Reading) -> Result<Option<usize>, F
                 .filter(|v| is_column(v))
                 .map(|v| v.name.as_str())
                 .collect();
-            Failure::failed(
-                ErrorCode::ChannelNotFound,
-                format_args!(
-                    "there is no vector \"{wanted}\" for --time-column; the vectors are {}",
-                    names.join(", ")
-                ),
-            )
+            ErrorCode::ChannelNotFound.failed(format_args!(
+                "there is no vector \"{wanted}\" for --time-column; the vectors are {}",
+                names.join(", ")
+            ))
         });
     }
     let mut found = (0..variables.len()).filter(|i| {
@@ -347,10 +341,8 @@ fn seconds(time: &Variable, reading: &Reading) -> Result<TimeAxis, Failure> {
     };
     let known = unit.and_then(NamedUnit::parse).filter(NamedUnit::is_time);
     if is_given && known.is_none() {
-        return Err(Failure::usage(
-            ErrorCode::InvalidValue,
-            "--time-unit is not a unit of time; expected s, ms, us or min",
-        ));
+        return Err(ErrorCode::InvalidValue
+            .usage("--time-unit is not a unit of time; expected s, ms, us or min"));
     }
     let second = known.as_ref().map_or(1.0, |unit| unit.unit.factor());
     let mut axis = stamped(&time.name, time.values.iter().map(|t| t * second).collect());

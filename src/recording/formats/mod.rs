@@ -78,13 +78,10 @@ pub(super) fn refuse_unit_of_fraction(
     let (Some(unit), Some(flag)) = (&choice.unit, choice.flags.unit) else {
         return Ok(());
     };
-    Err(Failure::usage(
-        ErrorCode::ConflictingArguments,
-        format_args!(
-            "the samples are fractions of full scale, so {flag} {unit} alone does not define them; give full scale \
-             with its unit, as --full-scale \"10 {unit}\""
-        ),
-    ))
+    Err(ErrorCode::ConflictingArguments.usage(format_args!(
+        "the samples are fractions of full scale, so {flag} {unit} alone does not define them; give full scale \
+         with its unit, as --full-scale \"10 {unit}\""
+    )))
 }
 
 /// Content of a file.
@@ -117,12 +114,9 @@ impl Format {
         if content.channels.is_empty() {
             let why = content.warnings.iter().chain(&content.lost);
             let why: String = why.map(|w| format!(": {}", w.message)).collect();
-            return Err(Failure::failed(
-                ErrorCode::NotARecording,
-                format_args!(
-                    "there is no channel with samples over time{why}; export one, if need be as text with a time column"
-                ),
-            )
+            return Err(ErrorCode::NotARecording.failed(format_args!(
+                "there is no channel with samples over time{why}; export one, if need be as text with a time column"
+            ))
             .at(source));
         }
         Ok(Recording {
@@ -207,9 +201,7 @@ fn cut(what: &str) -> Warning {
 
 /// Failure for a file with inconsistent content.
 fn damaged(what: impl std::fmt::Display, at: u64) -> Failure {
-    Failure::failed(
-        ErrorCode::DamagedFile,
-        format_args!("{what}; copy or export the file again"),
-    )
-    .with(|place| place.byte = Some(at))
+    ErrorCode::DamagedFile
+        .failed(format_args!("{what}; copy or export the file again"))
+        .with(|place| place.byte = Some(at))
 }

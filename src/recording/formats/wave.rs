@@ -70,13 +70,10 @@ impl Layout {
             (3, 4) => (Number::Float32, 1.0, 0.0, "floating point"),
             (3, 8) => (Number::Float64, 1.0, 0.0, "floating point"),
             _ => {
-                return Err(Failure::failed(
-                    ErrorCode::NotARecording,
-                    format_args!(
-                        "the WAV format {tag} with {bits} bits is not supported; convert \
+                return Err(ErrorCode::NotARecording.failed(format_args!(
+                    "the WAV format {tag} with {bits} bits is not supported; convert \
                          it to PCM (sox IN.wav -e signed -b 24 OUT.wav)"
-                    ),
-                ));
+                )));
             }
         };
         if width * channels != block || plausible_rate(rate_hz).is_none() {

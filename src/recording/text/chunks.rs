@@ -11,10 +11,7 @@ pub const LONGEST_LINE: usize = 1 << 24;
 
 /// Failure for a line longer than [`LONGEST_LINE`].
 pub fn too_long_a_line() -> Failure {
-    Failure::failed(
-        ErrorCode::NotARecording,
-        "a line is longer than 16 MiB: this is not a table of numbers",
-    )
+    ErrorCode::NotARecording.failed("a line is longer than 16 MiB: this is not a table of numbers")
 }
 /// Bytes per piece: large enough to be fast, small enough to stay in cache.
 const PIECE: usize = 1 << 17;

@@ -40,24 +40,18 @@ pub(super) fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
     }
     let shown: String = lines[0].trim().chars().take(SHOWN).collect();
     if pairs == 1 {
-        return Err(Failure::failed(
-            ErrorCode::TextUnclear,
-            format_args!(
-                "is \"{shown}\" one number with a decimal comma, or two whole numbers? Say so with --decimal , or with \
-                 --delimiter ,"
-            ),
-        )
+        return Err(ErrorCode::TextUnclear.failed(format_args!(
+            "is \"{shown}\" one number with a decimal comma, or two whole numbers? Say so with --decimal , or with \
+             --delimiter ,"
+        ))
         .line(head.number(table.first)));
     }
-    Err(Failure::failed(
-        ErrorCode::TextUnclear,
-        format_args!(
-            "is \"{shown}\" {pairs} numbers with decimal commas? Commas part its cells as well, so that each number \
-             is in two pieces: {} cells, whole numbers and digits by turns. Export the file with decimal points, or \
-             with semicolons between the cells; if the cells are whole numbers, say so with --delimiter ,",
-            table.width
-        ),
-    )
+    Err(ErrorCode::TextUnclear.failed(format_args!(
+        "is \"{shown}\" {pairs} numbers with decimal commas? Commas part its cells as well, so that each number \
+         is in two pieces: {} cells, whole numbers and digits by turns. Export the file with decimal points, or \
+         with semicolons between the cells; if the cells are whole numbers, say so with --delimiter ,",
+        table.width
+    ))
     .line(head.number(table.first)))
 }
 

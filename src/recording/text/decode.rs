@@ -213,14 +213,9 @@ fn refuse_other_formats(head: &[u8]) -> Result<(), Failure> {
         ),
     ];
     match known.iter().find(|(magic, _)| head.starts_with(magic)) {
-        Some((_, what)) => Err(Failure::failed(
-            ErrorCode::NotARecording,
-            format_args!("the file is {what}"),
-        )),
-        None if is_binary(head) => Err(Failure::failed(
-            ErrorCode::NotARecording,
-            "the file is binary; expected a text table (CSV, TSV or a recorder's export)",
-        )),
+        Some((_, what)) => Err(ErrorCode::NotARecording.failed(format_args!("the file is {what}"))),
+        None if is_binary(head) => Err(ErrorCode::NotARecording
+            .failed("the file is binary; expected a text table (CSV, TSV or a recorder's export)")),
         None => Ok(()),
     }
 }

@@ -15,15 +15,12 @@ pub(super) fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
     let Some(line) = above.into_iter().find(|k| is_scale(&head.lines[*k].text)) else {
         return Ok(());
     };
-    Err(Failure::failed(
-        ErrorCode::UnitUnclear,
-        format_args!(
-            "\"{}\" is the common factor of a displayed matrix (MATLAB, Octave), which multiplies all columns and leaves \
-             few digits of them; export the numbers themselves with writematrix([t y], \"run.csv\") or dlmwrite, or multiply \
-             all columns by it and remove the line",
-            head.lines[line].text.trim()
-        ),
-    )
+    Err(ErrorCode::UnitUnclear.failed(format_args!(
+        "\"{}\" is the common factor of a displayed matrix (MATLAB, Octave), which multiplies all columns and leaves \
+         few digits of them; export the numbers themselves with writematrix([t y], \"run.csv\") or dlmwrite, or multiply \
+         all columns by it and remove the line",
+        head.lines[line].text.trim()
+    ))
     .line(head.number(line)))
 }
 

@@ -133,10 +133,7 @@ pub fn find(
         }
     }
     Err(failure.unwrap_or_else(|| {
-        Failure::failed(
-            ErrorCode::NotARecording,
-            "the file is empty; expected rows of numbers",
-        )
+        ErrorCode::NotARecording.failed("the file is empty; expected rows of numbers")
     }))
 }
 
@@ -168,10 +165,7 @@ fn find_in(head: &Head, marks: &DialectOverride) -> Result<Table, Failure> {
     }
     let lenient = tables(head, &all, lenient_row);
     let Some(best) = best(&lenient).map(|best| with_fewest_texts(&lenient, best)) else {
-        return Err(Failure::failed(
-            ErrorCode::NotARecording,
-            no_table::why(head),
-        ));
+        return Err(ErrorCode::NotARecording.failed(no_table::why(head)));
     };
     super::listing::refuse(head, &best.table)?;
     Ok(best.table.clone())
@@ -417,14 +411,12 @@ fn unambiguous<'a>(head: &Head, found: &'a [Found], best: &'a Found) -> Result<&
         {
             return Ok(separator);
         }
-        return Err(Failure::failed(
-            ErrorCode::TextUnclear,
-            format_args!(
+        return Err(ErrorCode::TextUnclear
+            .failed(format_args!(
                 "\"{shown}\" can be read with the comma between cells or as a decimal \
              mark; say which with --delimiter , or --decimal ,"
-            ),
-        )
-        .line(line));
+            ))
+            .line(line));
     }
     thousands::refuse(head, &best.table, &others)?;
     Ok(best)

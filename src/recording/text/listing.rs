@@ -38,15 +38,12 @@ pub fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
         if let Some(question) = transposed(table.width, Some(rows.len())) {
             return Err(question);
         }
-        return Err(Failure::failed(
-            ErrorCode::NotARecording,
-            format_args!(
-                "the file is a list of results, not a recording: each of its {} rows from line {} on has its own name \
-                 in the first column; expected rows of numbers, one per sample",
-                rows.len(),
-                head.number(table.first)
-            ),
-        ));
+        return Err(ErrorCode::NotARecording.failed(format_args!(
+            "the file is a list of results, not a recording: each of its {} rows from line {} on has its own name \
+             in the first column; expected rows of numbers, one per sample",
+            rows.len(),
+            head.number(table.first)
+        )));
     }
     // With a time for each row, states such as alarms are consistent with a recording.
     let has_time = (0..table.width).any(|place| is_clock(&read, place)) || begins_with_epoch(&read);
@@ -55,15 +52,12 @@ pub fn refuse(head: &Head, table: &Table) -> Result<(), Failure> {
         .count();
     // A single signal may have one or two columns of remarks.
     if texts > 2 && texts as f64 > TEXTS * table.width as f64 {
-        return Err(Failure::failed(
-            ErrorCode::NotARecording,
-            format_args!(
-                "the file is a list of settings or results, not a recording: {texts} of the {} columns from line {} on \
-                 contain text; expected rows of numbers, one per sample",
-                table.width,
-                head.number(table.first)
-            ),
-        ));
+        return Err(ErrorCode::NotARecording.failed(format_args!(
+            "the file is a list of settings or results, not a recording: {texts} of the {} columns from line {} on \
+             contain text; expected rows of numbers, one per sample",
+            table.width,
+            head.number(table.first)
+        )));
     }
     Ok(())
 }
@@ -108,14 +102,11 @@ pub fn refuse_variables(
         ((1..=1 + of_time).contains(&values) || is_same_time()).then_some((count, place))
     });
     match listed {
-        Some((count, place)) => Err(Failure::failed(
-            ErrorCode::NotARecording,
-            format_args!(
-                "the rows name {count} variables in turn, first \"{}\" in \"{}\"; expected a column for each variable: \
-                 rewrite the file that way, or keep only the rows of one variable, without that column",
-                rows[0][place], fields[place].heading
-            ),
-        )
+        Some((count, place)) => Err(ErrorCode::NotARecording.failed(format_args!(
+            "the rows name {count} variables in turn, first \"{}\" in \"{}\"; expected a column for each variable: \
+             rewrite the file that way, or keep only the rows of one variable, without that column",
+            rows[0][place], fields[place].heading
+        ))
         .line(head.number(table.first))),
         None => Ok(()),
     }

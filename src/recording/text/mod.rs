@@ -229,10 +229,9 @@ impl TextFile {
 fn no_channel(warnings: &[Warning]) -> Failure {
     let skipped = warnings.iter().find(|w| is_of_skipped_column(w));
     let why = skipped.map_or_else(String::new, |w| format!(". {}", w.message));
-    Failure::failed(
-        ErrorCode::NotARecording,
-        format_args!("there is no column besides the time; expected one with the signal{why}"),
-    )
+    ErrorCode::NotARecording.failed(format_args!(
+        "there is no column besides the time; expected one with the signal{why}"
+    ))
 }
 
 /// Reads a text file of any dialect; `source` is its name for messages.
@@ -275,27 +274,23 @@ fn tables(
             break;
         }
         if parts.len() > MOST_TABLES {
-            return Err(Failure::failed(
-                ErrorCode::SeveralTables,
-                format_args!(
+            return Err(ErrorCode::SeveralTables
+                .failed(format_args!(
                     "there are more than {MOST_TABLES} tables below each other; split the \
                  file"
-                ),
-            )
-            .line(number));
+                ))
+                .line(number));
         }
         next = Layout::find(chunks, number, hints, reading);
         if let Err(failure) = &next
             && begins_anew
         {
-            return Err(Failure::failed(
-                ErrorCode::SeveralTables,
-                format_args!(
+            return Err(ErrorCode::SeveralTables
+                .failed(format_args!(
                     "a block of its own begins here, and cannot be read: {failure}; split \
                  the file"
-                ),
-            )
-            .line(number));
+                ))
+                .line(number));
         }
     }
     Ok(parts)

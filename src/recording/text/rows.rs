@@ -157,13 +157,10 @@ impl Rows {
         }
         match self.too_ragged {
             None => Ok(at),
-            Some(line) => Err(Failure::failed(
-                ErrorCode::NotARecording,
-                format_args!(
-                    "line {line} is so much longer than the rows before it that these would need more \
+            Some(line) => Err(ErrorCode::NotARecording.failed(format_args!(
+                "line {line} is so much longer than the rows before it that these would need more \
                  memory than the whole file; expected rows of about the same number of cells"
-                ),
-            )),
+            ))),
         }
     }
 

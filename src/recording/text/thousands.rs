@@ -43,7 +43,9 @@ pub(super) fn refuse(head: &Head, table: &Table, others: &[&Table]) -> Result<()
 /// The error that a line can be read in two ways.
 fn unclear(head: &Head, place: usize, why: impl Fn(&str) -> String) -> Failure {
     let shown: String = head.lines[place].text.trim().chars().take(60).collect();
-    Failure::failed(ErrorCode::TextUnclear, why(&shown)).line(head.number(place))
+    ErrorCode::TextUnclear
+        .failed(why(&shown))
+        .line(head.number(place))
 }
 
 /// Rejects a table with a column in which every number has the mark that is not the decimal mark of the others, before

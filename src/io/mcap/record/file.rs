@@ -250,12 +250,12 @@ impl FileReader {
         };
         file.held = file.want(MAGIC.len())?;
         if file.bytes() != MAGIC {
-            return Err(Failure::failed(
-                ErrorCode::NotARecording,
-                "not an MCAP file: it does not begin with the bytes 89 4d 43 41 50 30 0d 0a; \
+            return Err(ErrorCode::NotARecording
+                .failed(
+                    "not an MCAP file: it does not begin with the bytes 89 4d 43 41 50 30 0d 0a; \
                  record with a recorder that writes MCAP, or convert the file first",
-            )
-            .at(&file.name));
+                )
+                .at(&file.name));
         }
         Ok(file)
     }

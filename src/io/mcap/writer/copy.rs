@@ -50,12 +50,9 @@ pub(super) fn copy<W: Write>(
         if let Loss::Truncated { at, what } = loss
             && *what == IN_ATTACHMENT
         {
-            return Err(Failure::failed(
-                ErrorCode::DamagedFile,
-                format_args!(
-                    "the file ends within the attachment at byte {at}; repair it first with \"mcap recover\""
-                ),
-            )
+            return Err(ErrorCode::DamagedFile.failed(format_args!(
+                "the file ends within the attachment at byte {at}; repair it first with \"mcap recover\""
+            ))
             .at(input.name()));
         }
     }

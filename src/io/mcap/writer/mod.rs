@@ -74,24 +74,19 @@ impl<W: Write> Writer<W> {
         let copied = copy::copy(input, &mut sink, output_name)?;
         let mut index = copied.index;
         if index.topics.contains(&added.topic) {
-            return Err(Failure::failed(
-                ErrorCode::OutputExists,
-                format_args!(
+            return Err(ErrorCode::OutputExists
+                .failed(format_args!(
                     "the topic \"{}\" already exists; choose another one for the result",
                     added.topic
-                ),
-            )
-            .at(input.name()));
+                ))
+                .at(input.name()));
         }
         let torque = TorqueMessage::new(added.encoding, &added.name);
         let mut chunk = ChunkBuilder::new(copied.compression);
         let channel_id = declare(&mut index, &mut chunk, &torque, &added.topic)
             .map_err(|error| Failure::writing(output_name, &error))?
             .ok_or_else(|| {
-                Failure::failed(
-                    ErrorCode::CannotWrite,
-                    "no channel number is left in the file",
-                )
+                ErrorCode::CannotWrite.failed("no channel number is left in the file")
             })?;
         Ok(Self {
             sink,

@@ -177,13 +177,10 @@ impl GroupTimes {
         }
         if let (Some(wanted), true) = (&reading.time_column, of_group.is_empty()) {
             let names: Vec<String> = found.iter().take(NAMED).map(ScaledChannel::name).collect();
-            return Err(Failure::failed(
-                ErrorCode::ChannelNotFound,
-                format_args!(
-                    "there is no channel \"{wanted}\" for --time-column; the channels are {}",
-                    names.join(", ")
-                ),
-            ));
+            return Err(ErrorCode::ChannelNotFound.failed(format_args!(
+                "there is no channel \"{wanted}\" for --time-column; the channels are {}",
+                names.join(", ")
+            )));
         }
         Ok(Self { of_group })
     }
@@ -279,10 +276,8 @@ fn of_times(times: &ScaledChannel, reading: &Reading) -> Result<TimeAxis, Failur
     let known = |text: &str| NamedUnit::parse(text).filter(NamedUnit::is_time);
     let unit = match &reading.time_unit {
         Some(given) => Some(known(given).ok_or_else(|| {
-            Failure::usage(
-                ErrorCode::InvalidValue,
-                "--time-unit is not a unit of time; expected s, ms, us or min",
-            )
+            ErrorCode::InvalidValue
+                .usage("--time-unit is not a unit of time; expected s, ms, us or min")
         })?),
         None => {
             (times.object.text("unit_string").and_then(known)).or_else(|| of_name.and_then(known))

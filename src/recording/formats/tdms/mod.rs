@@ -150,13 +150,10 @@ impl TdmsFile {
         self.version = fields.u32()?;
         let (length, metadata) = (fields.u64()?, fields.u64()?);
         if !matches!(self.version, 4712 | 4713) {
-            return Err(Failure::failed(
-                ErrorCode::NotARecording,
-                format_args!(
-                    "TDMS version {}, expected 4712 or 4713; save it as TDMS 2.0 in LabVIEW",
-                    self.version
-                ),
-            ));
+            return Err(ErrorCode::NotARecording.failed(format_args!(
+                "TDMS version {}, expected 4712 or 4713; save it as TDMS 2.0 in LabVIEW",
+                self.version
+            )));
         }
         if metadata > length {
             return Err(damaged(

@@ -322,17 +322,14 @@ impl<'a> MetadataFields<'a> {
             return Ok(RawIndex::Other { bytes: self.u64()? });
         }
         let Some((stored, width)) = stored(kind) else {
-            return Err(Failure::failed(
-                ErrorCode::NotARecording,
-                format_args!(
-                    "data type {kind:#x}{} of a channel is not supported; save it as DBL in LabVIEW",
-                    match kind {
-                        0x0b | 0x1b => " (extended precision)",
-                        0x4f => " (fixed point)",
-                        _ => "",
-                    }
-                ),
-            )
+            return Err(ErrorCode::NotARecording.failed(format_args!(
+                "data type {kind:#x}{} of a channel is not supported; save it as DBL in LabVIEW",
+                match kind {
+                    0x0b | 0x1b => " (extended precision)",
+                    0x4f => " (fixed point)",
+                    _ => "",
+                }
+            ))
             .with(|place| place.byte = Some(at)));
         };
         Ok(match stored {

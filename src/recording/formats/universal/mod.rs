@@ -121,8 +121,7 @@ fn storage(line: &str, lines: &Lines) -> Result<Storage, Failure> {
         }
     };
     if field(line, 13, 6) != Some(2) {
-        return Err(Failure::failed(
-            ErrorCode::NotARecording,
+        return Err(ErrorCode::NotARecording.failed(
             "the data set 58b has DEC VMS or IBM floating-point numbers, which are not supported; write it as IEEE 754",
         )
         .line(lines.number));
@@ -202,11 +201,9 @@ fn text_values(lines: &mut Lines, wanted: usize, head: &Head) -> Result<Vec<f64>
             break;
         }
         if !numbers_of(&line, widths, &mut values) {
-            return Err(Failure::failed(
-                ErrorCode::InvalidSample,
-                "text where numbers of a data set 58 are expected; correct the line",
-            )
-            .line(lines.number));
+            return Err(ErrorCode::InvalidSample
+                .failed("text where numbers of a data set 58 are expected; correct the line")
+                .line(lines.number));
         }
     }
     if values.len() >= wanted {

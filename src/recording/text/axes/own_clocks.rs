@@ -56,14 +56,11 @@ impl Sources<'_> {
         let Some(other) = other else {
             return Ok(());
         };
-        Err(Failure::failed(
-            ErrorCode::TimeUnknown,
-            format_args!(
-                "\"{}\" and \"{}\" both run like time, at different rates, and their places do not show which channels \
-                 each belongs to; give the time of the channel with --time-column",
-                rule.heading, self.fields[other].heading
-            ),
-        ))
+        Err(ErrorCode::TimeUnknown.failed(format_args!(
+            "\"{}\" and \"{}\" both run like time, at different rates, and their places do not show which channels \
+             each belongs to; give the time of the channel with --time-column",
+            rule.heading, self.fields[other].heading
+        )))
     }
 
     /// Whether a column of numbers can be time by its name or unit, and has the steps of time.

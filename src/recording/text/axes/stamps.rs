@@ -302,20 +302,15 @@ impl Sources<'_> {
         let field = &self.fields[place];
         if let Some(text) = &self.reading.time_unit {
             let unit = Unit::parse(text).map_err(|error| {
-                Failure::usage(
-                    ErrorCode::InvalidValue,
-                    format_args!("--time-unit {text}: {error}"),
-                )
+                ErrorCode::InvalidValue.usage(format_args!("--time-unit {text}: {error}"))
             })?;
             let named = NamedUnit {
                 text: text.clone(),
                 unit,
             };
             if !units::is_time(&named) {
-                return Err(Failure::usage(
-                    ErrorCode::InvalidValue,
-                    format_args!("--time-unit {text} is not a unit of time"),
-                ));
+                return Err(ErrorCode::InvalidValue
+                    .usage(format_args!("--time-unit {text} is not a unit of time")));
             }
             return Ok(Some((unit.factor(), None)));
         }
@@ -323,14 +318,11 @@ impl Sources<'_> {
             return Ok(Some((seconds, None)));
         }
         if let Some(scale) = scale_in(&field.heading) {
-            return Err(Failure::failed(
-                ErrorCode::UnitUnclear,
-                format_args!(
-                    "the heading \"{}\" contains a scale factor, \"{scale}\", that may divide or multiply the time; \
-                     give the unit of its numbers, for example --time-unit ms",
-                    field.heading
-                ),
-            ));
+            return Err(ErrorCode::UnitUnclear.failed(format_args!(
+                "the heading \"{}\" contains a scale factor, \"{scale}\", that may divide or multiply the time; \
+                 give the unit of its numbers, for example --time-unit ms",
+                field.heading
+            )));
         }
         if let Some(unit) = field.unit.as_ref().filter(|unit| units::is_time(unit)) {
             return Ok(Some((unit.unit.factor(), None)));

@@ -97,8 +97,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
             .for_each(|channel| channel.segment = None);
     }
     if recording.channels.is_empty() {
-        return Err(Failure::failed(
-            ErrorCode::DamagedFile,
+        return Err(ErrorCode::DamagedFile.failed(
             "the LabVIEW file ends before its first sample; expected a segment with channels",
         ));
     }

@@ -69,12 +69,8 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
         text.len() <= FOR_MAKER,
         1,
     );
-    let start = MathcadHead::of(&head).ok_or_else(|| {
-        Failure::failed(
-            ErrorCode::DamagedFile,
-            "the first four lines are not a header",
-        )
-    })?;
+    let start = MathcadHead::of(&head)
+        .ok_or_else(|| ErrorCode::DamagedFile.failed("the first four lines are not a header"))?;
     let mut lines = text.split_inclusive(|byte| *byte == b'\n');
     let skipped: usize = lines.by_ref().take(HEAD).map(<[u8]>::len).sum();
     let (read, _) = rows::of_numbers(&text[skipped..], 1 + HEAD, DIALECT, [0], &[])?;

@@ -69,10 +69,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
     let (text, complete) = chunks.peek(FOR_MAKER)?;
     let head = Head::of(text, complete, 1);
     let (Some(start), Some(first)) = (Start::of(&head), head.lines.get(2)) else {
-        return Err(Failure::failed(
-            ErrorCode::DamagedFile,
-            "the file ends before its first sample",
-        ));
+        return Err(ErrorCode::DamagedFile.failed("the file ends before its first sample"));
     };
     chunks.skip(first.offset);
     let text = chunks.take_all()?;

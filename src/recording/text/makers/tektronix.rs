@@ -75,10 +75,9 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
         1,
     );
     let Some((dialect, blocks, _)) = side_by_side(&head) else {
-        return Err(Failure::failed(
-            ErrorCode::DamagedFile,
-            "the first line has no time and value beside its key",
-        ));
+        return Err(
+            ErrorCode::DamagedFile.failed("the first line has no time and value beside its key")
+        );
     };
     let numbers = blocks.iter().flat_map(|place| [place + 3, place + 4]);
     let (read, _) = rows::of_numbers(&text, 1, dialect, numbers, &[])?;
