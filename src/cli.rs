@@ -167,7 +167,6 @@ pub struct OneChannel {
 
 impl OneChannel {
     /// The one recording that is read.
-    #[must_use]
     pub fn input(&self) -> &Path {
         &self.inputs[0]
     }
@@ -230,7 +229,6 @@ pub struct Work {
 
 impl Work {
     /// Threads to use.
-    #[must_use]
     pub fn thread_count(&self) -> usize {
         self.threads
             .map_or_else(crate::parallel::threads, usize::from)
@@ -251,7 +249,6 @@ pub struct Strictness {
 
 impl Strictness {
     /// Whether warnings with these codes are too many.
-    #[must_use]
     pub fn refuses<'a>(&self, mut codes: impl Iterator<Item = &'a str>) -> bool {
         self.strict && codes.any(|code| self.allow.iter().all(|allowed| allowed != code))
     }

@@ -64,7 +64,6 @@ pub struct ErrorPlace {
 
 impl ErrorPlace {
     /// RowKind `number`, from 1, of a file.
-    #[must_use]
     pub fn of_row(file: &str, row: RowKind, number: usize) -> Self {
         let mut place = Self {
             file: Some(file.to_owned()),
@@ -160,7 +159,6 @@ impl Failure {
     }
 
     /// The exit code.
-    #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
@@ -199,7 +197,6 @@ impl Failure {
     }
 
     /// Kind of failure; `None` for a closed pipe.
-    #[must_use]
     pub fn code(&self) -> Option<ErrorCode> {
         match self {
             Self::Usage(fault) | Self::Failed(fault) => Some(fault.code),
@@ -208,7 +205,6 @@ impl Failure {
     }
 
     /// JSON document of the failure; `None` for a closed pipe.
-    #[must_use]
     pub fn document(&self) -> Option<ErrorDocument<'_>> {
         match self {
             Self::Usage(fault) | Self::Failed(fault) => Some(fault.document()),
@@ -304,7 +300,6 @@ impl From<torqcomp_model::fit::FitError> for Failure {
 }
 
 /// The known name closest to a wrong one, as a sentence to end a message.
-#[must_use]
 pub fn did_you_mean<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let wrong = wrong.to_lowercase();
     known

@@ -7,14 +7,14 @@ mod commands;
 mod diagnose;
 #[cfg(test)]
 mod docs_tests;
-pub mod failure;
+mod failure;
 mod file_name;
 pub mod identify;
-pub mod inverse;
+mod inverse;
 pub mod io;
 mod log;
 mod noise_colour;
-pub mod outcome;
+mod outcome;
 mod parallel;
 mod pipeline;
 pub mod print;
@@ -22,15 +22,14 @@ mod progress;
 mod provenance;
 pub mod quality;
 pub mod recording;
-pub mod stand;
+mod stand;
 mod student;
-pub mod unit;
-pub mod warning;
+mod unit;
+mod warning;
 
 use std::process::ExitCode;
 
 /// Runs the command line of this process.
-#[must_use]
 pub fn run() -> ExitCode {
     if let Err(error) = io::remove_when_interrupted() {
         let message = "interrupting this run may leave a temporary file behind";

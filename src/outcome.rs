@@ -19,7 +19,6 @@ pub enum Outcome {
 
 impl Outcome {
     /// The exit code.
-    #[must_use]
     pub fn exit_code(self) -> u8 {
         match self {
             Self::Done => 0,

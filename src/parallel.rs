@@ -8,13 +8,11 @@ use std::sync::{LazyLock, Mutex};
 const MOST_THREADS: usize = 8;
 
 /// Threads available for one job.
-#[must_use]
 pub fn threads() -> usize {
     cores().min(MOST_THREADS)
 }
 
 /// Cores available to this process: those that Slurm assigns to the task, limited by the system (including its cgroup).
-#[must_use]
 pub fn cores() -> usize {
     // On Linux, this reads files of the cgroup.
     static SYSTEM: LazyLock<usize> =

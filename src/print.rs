@@ -13,7 +13,6 @@ use unicode_width::UnicodeWidthStr;
 ///
 /// # Panics
 /// Never: all keys of the reports are strings, and no part fails to serialise.
-#[must_use]
 pub fn json(report: &impl Serialize) -> String {
     escaped(serde_json::to_string_pretty(report))
 }
@@ -121,7 +120,6 @@ pub(crate) fn note(text: &str) {
 /// assert_eq!(visible("\x1b[2Jtorque".to_owned()), "\\u{1b}[2Jtorque");
 /// assert_eq!(visible("\u{202e}mN".to_owned()), "\\u{202e}mN");
 /// ```
-#[must_use]
 pub fn visible(text: String) -> String {
     written_out(text, |c| c.escape_unicode().to_string())
 }
@@ -146,13 +144,11 @@ fn written_out(text: String, written: impl Fn(char) -> String) -> String {
 const LARGE_RELATIVE: f64 = 10.0;
 
 /// A number for people: six significant digits.
-#[must_use]
 pub fn short(value: f64) -> String {
     digits::text(value, 6)
 }
 
 /// A number for people with the given number of significant digits.
-#[must_use]
 pub fn rounded(value: f64, digits: u32) -> String {
     digits::text(value, digits)
 }
@@ -165,7 +161,6 @@ pub fn rounded(value: f64, digits: u32) -> String {
 /// assert_eq!(relative(-0.5, 2), "-50 %");
 /// assert_eq!(relative(230_000.0, 2), "230000 times");
 /// ```
-#[must_use]
 pub fn relative(ratio: f64, digits: u32) -> String {
     match ratio.abs() < LARGE_RELATIVE {
         true => format!("{} %", rounded(100.0 * ratio, digits)),
@@ -183,7 +178,6 @@ pub fn relative(ratio: f64, digits: u32) -> String {
 /// assert_eq!(with_std(81234.0, 996.0), "81200 ± 1000");
 /// assert_eq!(with_std(-1.99982e-7, 1.7e-11), "(-1.99982 ± 0.00017)e-7");
 /// ```
-#[must_use]
 pub fn with_std(value: f64, std: f64) -> String {
     let [value, std] = value_and_std(value, std);
     match (value.split_once('e'), std.split_once('e')) {
@@ -193,7 +187,6 @@ pub fn with_std(value: f64, std: f64) -> String {
 }
 
 /// The value and its uncertainty as two texts, for columns.
-#[must_use]
 pub fn value_and_std(value: f64, std: f64) -> [String; 2] {
     if !(value.is_finite() && std.is_finite() && std > 0.0) {
         return [rounded(value, 6), rounded(std, 2)];
@@ -234,7 +227,6 @@ pub fn value_and_std(value: f64, std: f64) -> [String; 2] {
 /// assert_eq!(plural(1, "mode"), "1 mode");
 /// assert_eq!(plural(2, "stretch"), "2 stretches");
 /// ```
-#[must_use]
 pub fn plural<N: fmt::Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
     if count == N::from(1) {
         return format!("1 {noun}");
@@ -273,7 +265,6 @@ pub(crate) fn enumeration<T: AsRef<str>>(items: &[T], word: &str) -> String {
 }
 
 /// A unit for people, also if the file gives none.
-#[must_use]
 pub fn unit_or_as_recorded(unit: &str) -> &str {
     match unit {
         "" => "as recorded",
@@ -282,7 +273,6 @@ pub fn unit_or_as_recorded(unit: &str) -> &str {
 }
 
 /// The unit of one quantity over another: `V/N`, `V/(N m)`.
-#[must_use]
 pub fn unit_of_quotient((over, under): (&str, &str)) -> String {
     let one = |unit: &str| if unit.is_empty() { "1" } else { unit }.to_owned();
     let under = match under.contains([' ', '/']) {
@@ -293,7 +283,6 @@ pub fn unit_of_quotient((over, under): (&str, &str)) -> String {
 }
 
 /// Rows of cells as aligned columns, the first aligned left, the others right.
-#[must_use]
 pub fn columns(rows: &[Vec<String>]) -> String {
     let count = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |i: usize| {

@@ -32,7 +32,6 @@ impl NamedUnit {
 
     /// Reads a unit as recorders write it, without words in brackets after it
     /// (`Voltage (unscaled)` names no unit).
-    #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let text = text.trim();
         let text = match inside_brackets(text) {
@@ -71,7 +70,6 @@ impl NamedUnit {
     }
 
     /// Whether it is a unit of time.
-    #[must_use]
     pub fn is_time(&self) -> bool {
         self.unit.dimension() == Dimension::new([0, 0, 1, 0, 0, 0])
     }

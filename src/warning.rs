@@ -14,7 +14,6 @@ pub struct Warning {
 
 impl Warning {
     /// A warning.
-    #[must_use]
     pub fn new(code: &'static str, message: impl Into<String>) -> Self {
         Self {
             code,

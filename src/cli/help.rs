@@ -71,7 +71,6 @@ const EXAMPLES: &[&str] = &[
 ];
 
 /// The command line with its help for people.
-#[must_use]
 pub fn command() -> Command {
     with_examples("torqcomp", Cli::command())
 }

@@ -43,7 +43,6 @@ impl Test {
     }
 
     /// What is written, and the records that must not be replaced.
-    #[must_use]
     pub fn target(&self) -> (&Findings, &[PathBuf]) {
         match self {
             Self::Decay(test) => (&test.findings, &test.inputs),

@@ -54,7 +54,6 @@ pub struct BatchOptions {
 
 impl BatchOptions {
     /// Whether one of these options is given.
-    #[must_use]
     pub fn is_asked(&self) -> bool {
         self.files_from.is_some()
             || self.name.is_some()
@@ -69,7 +68,6 @@ impl BatchOptions {
     }
 
     /// Number of failures after which no further recording is started.
-    #[must_use]
     pub fn most_failures(&self) -> Option<u32> {
         match self.fail_fast {
             true => Some(1),

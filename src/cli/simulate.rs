@@ -61,7 +61,6 @@ pub struct Simulate {
 
 impl Simulate {
     /// The one recording that is read.
-    #[must_use]
     pub fn input(&self) -> &Path {
         &self.inputs[0]
     }

@@ -71,7 +71,7 @@ struct Stiffness {
 
 impl<'a> Drawing<'a> {
     fn of(stand: &'a Stand) -> Result<Self, Failure> {
-        let parts: Vec<Option<&Estimate>> = stand.parts.iter().map(|p| Some(&p.inertia)).collect();
+        let parts: Vec<Option<&Estimate>> = stand.parts.iter().map(Some).collect();
         let sum = derive(stand, Kind::Inertia, &parts, |x| x.iter().sum())?;
         let friction = stand.friction.as_ref();
         let inputs = [

@@ -58,13 +58,11 @@ impl NamedEstimate {
     }
 
     /// Value in the constant's unit.
-    #[must_use]
     pub fn value(&self) -> f64 {
         self.estimate.value()
     }
 
     /// Standard uncertainty; `None` if not identifiable from the data.
-    #[must_use]
     pub fn std(&self) -> Option<f64> {
         self.estimate.std_uncertainty()
     }
@@ -258,7 +256,6 @@ impl Identification {
     }
 
     /// A parameter by its name.
-    #[must_use]
     pub fn get(&self, name: &str) -> Option<&NamedEstimate> {
         self.parameters.iter().find(|c| c.name == name)
     }

@@ -113,7 +113,6 @@ fn derived<const N: usize>(from: &Estimates, rows: &[Row<N>]) -> NamedEstimates 
 
 impl ModalPole {
     /// A mode from the covariance of σ and ω.
-    #[must_use]
     pub fn new(pole: Pole, covariance: Covariance) -> Self {
         let values = vec![pole.rate_per_s, pole.omega_rad_per_s];
         Self {
@@ -122,7 +121,6 @@ impl ModalPole {
     }
 
     /// A mode with its residue, from the covariance of σ, ω, Re R and Im R.
-    #[must_use]
     pub fn with_residue(pole: Pole, residue: Complex64, covariance: Covariance) -> Self {
         let values = vec![
             pole.rate_per_s,
@@ -136,7 +134,6 @@ impl ModalPole {
     }
 
     /// σ and ω without their uncertainties.
-    #[must_use]
     pub fn pole(&self) -> Pole {
         Pole::all(self.numbers.values())[0]
     }
@@ -155,7 +152,6 @@ impl ModalPole {
     }
 
     /// Damped frequency, decay rate, damping ratio and natural frequency.
-    #[must_use]
     pub fn modal_constants(&self) -> NamedEstimates {
         let pole = self.pole();
         let (s, w) = (pole.rate_per_s, pole.omega_rad_per_s);
@@ -192,7 +188,6 @@ impl ModalPole {
     /// let ratios = mode.over_stiffness();
     /// assert_eq!((ratios.list[0].value(), ratios.list[1].value()), (0.24, 0.04));
     /// ```
-    #[must_use]
     pub fn over_inertia(&self) -> NamedEstimates {
         let (s, w, q) = self.squares();
         let rows = [
@@ -203,7 +198,6 @@ impl ModalPole {
     }
 
     /// f/K and J/K.
-    #[must_use]
     pub fn over_stiffness(&self) -> NamedEstimates {
         let (s, w, q) = self.squares();
         let by_s = 2.0 / q - 4.0 * s * s / (q * q);
@@ -238,7 +232,6 @@ impl ModalPole {
     /// // J = 50/25, f = 2·3·2.
     /// assert_eq!((constants.list[1].value(), constants.list[2].value()), (2.0, 12.0));
     /// ```
-    #[must_use]
     pub fn scaled_by_known_constant(&self, known: KnownConstant) -> NamedEstimates {
         let (s, w, q) = self.squares();
         let rows = match known {
@@ -266,7 +259,6 @@ impl ModalPole {
 
     /// The same with the motion in rad (or rad/s, …) and the torque in N m; `rad_per_n_m` is the unit
     /// of the response.
-    #[must_use]
     pub fn scaled(&self, rad_per_n_m: f64) -> Self {
         let values = self.numbers.values();
         let size = |i: usize| if i < 2 { 1.0 } else { rad_per_n_m };
@@ -295,7 +287,6 @@ impl ModalPole {
     /// let values: Vec<f64> = mode.stand_constants().unwrap().list.iter().map(|c| c.value()).collect();
     /// assert_eq!(values, [2.0, 12.0, 50.0]);
     /// ```
-    #[must_use]
     pub fn stand_constants(&self) -> Option<NamedEstimates> {
         let [s, w, _, im] = *self.numbers.values() else {
             return None;
@@ -327,7 +318,6 @@ impl ModalPole {
     /// // A tenth, fifty standard deviations.
     /// assert!((mode.residue_phase().unwrap() - 0.1_f64.atan()).abs() < 1e-12);
     /// ```
-    #[must_use]
     pub fn residue_phase(&self) -> Option<f64> {
         let [_, _, re, im] = *self.numbers.values() else {
             return None;

@@ -34,7 +34,6 @@ pub enum Input {
 
 impl Input {
     /// `-` is standard input.
-    #[must_use]
     pub fn of(path: &Path) -> Self {
         if is_dash(path) {
             Self::Stdin
@@ -44,7 +43,6 @@ impl Input {
     }
 
     /// Name for messages.
-    #[must_use]
     pub fn name(&self) -> String {
         match self {
             Self::Stdin => "standard input".to_owned(),

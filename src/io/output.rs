@@ -56,7 +56,6 @@ pub(crate) fn keep_free(path: &Path) {
 
 impl Output {
     /// Standard output.
-    #[must_use]
     pub fn stdout() -> Self {
         Self {
             place: PathBuf::from("-"),
@@ -165,7 +164,6 @@ impl Output {
     }
 
     /// Name for messages.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }

@@ -177,7 +177,6 @@ impl Default for ChannelChoice {
 
 impl ChannelChoice {
     /// Channel and unit given by a command's own options.
-    #[must_use]
     pub fn of(flags: Flags, channel: Option<&str>, unit: Option<&str>) -> Self {
         Self {
             channel: channel.map(str::to_owned),
@@ -189,7 +188,6 @@ impl ChannelChoice {
     }
 
     /// The channel named by an option of the command, with its unit if given by another option.
-    #[must_use]
     pub fn named([channel, unit]: [&'static str; 2], name: &str, unit_text: Option<&str>) -> Self {
         let flags = Flags {
             channel,
@@ -199,7 +197,6 @@ impl ChannelChoice {
     }
 
     /// The channels named by `--applied` and `--measured`, each with its unit if given.
-    #[must_use]
     pub fn applied_and_measured(names: [&str; 2], units: [Option<&str>; 2]) -> [Self; 2] {
         [
             Self::named(["--applied", "--applied-unit"], names[0], units[0]),
@@ -208,7 +205,6 @@ impl ChannelChoice {
     }
 
     /// The channel named by `--measured`, with its unit if given.
-    #[must_use]
     pub fn measured_alone(name: &str, unit: Option<&str>) -> Self {
         Self::named(["--measured", "--measured-unit"], name, unit)
     }

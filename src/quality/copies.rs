@@ -22,7 +22,6 @@ struct Family<'a> {
 
 /// Warnings about channels of one file that follow from each other, each with the names of all of
 /// them.
-#[must_use]
 pub fn within(recording: &Recording) -> Vec<(Warning, Vec<String>)> {
     let mut families: Vec<Family> = Vec::new();
     for channel in seen(recording) {
@@ -93,7 +92,6 @@ fn follows(first: &str, channel: &Channel, relation: &Relation) -> String {
 }
 
 /// Warnings about channels of different files with equal samples.
-#[must_use]
 pub fn across(recordings: &[&Recording]) -> Vec<Warning> {
     let portraits: Vec<Vec<Seen>> = recordings.iter().map(|r| seen(r)).collect();
     let mut found = Vec::new();

@@ -48,7 +48,6 @@ pub struct Of<'a> {
 /// assert_eq!((found.len(), found[0].code), (1, "stuck-channel"));
 /// assert!(found[0].message.contains("10 samples at 0 mV, starting at 3 s"), "{}", found[0].message);
 /// ```
-#[must_use]
 pub fn warnings(samples: &[f64], of: Of) -> Vec<Warning> {
     let scaled: Vec<f64> = samples.iter().map(|sample| sample * of.scale).collect();
     let axis = TimeAxis::uniform(of.rate_hz, of.start);

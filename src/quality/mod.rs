@@ -34,7 +34,6 @@ pub use time::TimeFindings;
 /// let found = quality::warnings("torque", "N m", &samples, &axis);
 /// assert_eq!(found[0].code, "clipped");
 /// ```
-#[must_use]
 pub fn warnings(name: &str, unit: &str, samples: &[f64], axis: &TimeAxis) -> Vec<Warning> {
     of_findings(name, unit, Findings::of(samples, axis.rate_hz), axis)
 }
@@ -109,7 +108,6 @@ pub(crate) fn coarse_of(channels: &[Channel]) -> Vec<Warning> {
 }
 
 /// Warning about constant channels.
-#[must_use]
 pub fn constant(channels: &[(&str, f64)]) -> Warning {
     let named = channels
         .iter()
@@ -121,7 +119,6 @@ pub fn constant(channels: &[(&str, f64)]) -> Warning {
 }
 
 /// Warning about coarsely resolved channels.
-#[must_use]
 pub fn coarse(channels: &[(&str, &str, Quantisation)]) -> Warning {
     let named = channels.iter().map(|(name, unit, q)| {
         format!(
@@ -181,7 +178,6 @@ fn place(axis: &TimeAxis, index: usize) -> String {
 }
 
 /// Unit of a channel as written in the file; empty if none.
-#[must_use]
 pub fn unit_of(channel: &Channel) -> &str {
     let known = channel.unit.as_ref().map(|unit| unit.text.as_str());
     channel.unit_text.as_deref().or(known).unwrap_or("")
@@ -189,7 +185,6 @@ pub fn unit_of(channel: &Channel) -> &str {
 
 /// Unambiguous names of channels: with the segment, or the number of the channel where several of one
 /// segment have the same name.
-#[must_use]
 pub fn labels(channels: &[Channel]) -> Vec<String> {
     let key = |channel: &Channel| (channel.name.clone(), channel.segment);
     let mut counts: HashMap<(String, Option<usize>), usize> = HashMap::new();

@@ -70,7 +70,6 @@ pub struct Findings {
 
 impl Findings {
     /// Analyses the samples of a channel.
-    #[must_use]
     pub fn of(samples: &[f64], rate_hz: Option<f64>) -> Self {
         let (mean, std) = mean_and_std(samples).unzip();
         let clipping = Clipping::of(samples);
@@ -114,13 +113,11 @@ impl Findings {
     }
 
     /// Value of a constant channel with enough samples to be conspicuous.
-    #[must_use]
     pub fn dead(&self) -> Option<f64> {
         self.constant.filter(|_| self.samples >= FEW)
     }
 
     /// The resolution, if it is coarse for a measurement.
-    #[must_use]
     pub fn coarse(&self) -> Option<Quantisation> {
         self.quantisation
             .filter(|q| is_coarse(q, COARSE))
@@ -129,7 +126,6 @@ impl Findings {
 
     /// Warnings about this channel, except those combined for several channels ([`super::constant`],
     /// [`super::coarse`]). `holes` are the non-numeric cells, as far as they are known.
-    #[must_use]
     pub fn warnings(
         &self,
         name: &str,

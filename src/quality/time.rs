@@ -35,7 +35,6 @@ pub struct TimeFindings {
 
 impl TimeFindings {
     /// Analyses an axis.
-    #[must_use]
     pub fn of(axis: &TimeAxis) -> Self {
         let Some(stamps_s) = &axis.stamps_s else {
             return Self::default();
@@ -69,7 +68,6 @@ impl TimeFindings {
     }
 
     /// The warnings; `whose` names the channels of the axis.
-    #[must_use]
     pub fn warnings(&self, whose: &str, axis: &TimeAxis) -> Vec<Warning> {
         let mut found: Vec<Warning> = missing(whose, axis).into_iter().collect();
         if let Some(assumed) = &axis.assumed {
@@ -112,7 +110,6 @@ impl TimeFindings {
 
 /// Warning about a channel that is a time axis itself (in a unit of time, rising along a straight
 /// line), if the rate in the file header contradicts it.
-#[must_use]
 pub fn stamps_in_channel(name: &str, channel: &Channel) -> Option<Warning> {
     let stated_hz = channel.axis.header_rate_hz?;
     let unit = channel.unit.as_ref().filter(|unit| unit.is_time())?;

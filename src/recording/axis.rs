@@ -110,7 +110,6 @@ pub enum RateFrom {
 
 impl RateFrom {
     /// As text and for JSON: `none`, `given`, `header: Delta_X`, `stamps: Time [s]`.
-    #[must_use]
     pub fn describe(&self) -> String {
         match self {
             Self::None => "none".to_owned(),
@@ -121,7 +120,6 @@ impl RateFrom {
     }
 
     /// As part of a sentence.
-    #[must_use]
     pub fn sentence(&self, resampled: bool) -> String {
         match self {
             Self::None => "unknown".to_owned(),
@@ -146,7 +144,6 @@ impl RateFrom {
 /// assert_eq!(typical_step(&[0.0, 2.0, 4.0, 10.0, 12.0]), Some(2.0));
 /// assert_eq!(typical_step(&[0.0, 1.0, 10.0, 100.0, 1000.0]), None);
 /// ```
-#[must_use]
 pub fn typical_step(stamps: &[f64]) -> Option<f64> {
     if let Some(step) = equal_step(stamps) {
         return Some(step);
@@ -351,13 +348,11 @@ impl TimeAxis {
     }
 
     /// An axis of stamps in seconds.
-    #[must_use]
     pub fn of_stamps(heading: &str, stamps_s: Arc<Vec<f64>>) -> Self {
         Self::of_stamps_after(0, heading, stamps_s)
     }
 
     /// An axis of stamps in seconds relative to an origin in ns.
-    #[must_use]
     pub fn of_stamps_after(origin_ns: i64, heading: &str, stamps_s: Arc<Vec<f64>>) -> Self {
         let origin_s = origin_ns as f64 * 1e-9;
         let step = step_of(&stamps_s, origin_s);
@@ -410,7 +405,6 @@ impl TimeAxis {
     }
 
     /// Axis of samples resampled to uniform steps.
-    #[must_use]
     pub fn uniform(rate_hz: f64, start: Moment) -> Self {
         Self {
             start: Some(start),
@@ -419,7 +413,6 @@ impl TimeAxis {
     }
 
     /// Axis with a rate from the file header; `words` gave it.
-    #[must_use]
     pub fn of_header(words: &str, rate_hz: f64, start_s: Option<f64>) -> Self {
         Self {
             rate_hz: Some(rate_hz),

@@ -89,7 +89,6 @@ pub struct Recording {
 
 impl Recording {
     /// An empty recording of a format.
-    #[must_use]
     pub fn empty(format: &'static str, source: String) -> Self {
         Self {
             source,
@@ -175,7 +174,6 @@ pub fn read(input: &Input, reading: &Reading) -> Result<Recording, Failure> {
 
 /// Reads bytes of a format other than text tables and MCAP; `None` if their start matches none of these. `source` is
 /// the name for messages.
-#[must_use]
 pub fn read_other_format(
     source: &str,
     bytes: &[u8],

@@ -21,7 +21,6 @@ pub struct Moment {
 
 impl Moment {
     /// A time on a clock with its own origin.
-    #[must_use]
     pub fn of_seconds(after_s: f64) -> Self {
         Self {
             origin_ns: 0,
@@ -30,7 +29,6 @@ impl Moment {
     }
 
     /// The time in seconds, to the precision of an `f64`.
-    #[must_use]
     pub fn seconds(self) -> f64 {
         if self.origin_ns == 0 {
             return self.after_s;
@@ -40,7 +38,6 @@ impl Moment {
     }
 
     /// The time in nanoseconds.
-    #[must_use]
     pub fn nanoseconds(self) -> i64 {
         self.origin_ns
             .saturating_add((self.after_s * 1e9).round() as i64)
@@ -56,13 +53,11 @@ impl Moment {
     }
 
     /// Date and time in UTC, if the clock counts from 1970.
-    #[must_use]
     pub fn date(self) -> Option<String> {
         date_and_time(self.nanoseconds()).filter(|_| self.origin_ns != 0)
     }
 
     /// The time as text, to seven digits if that loses nothing.
-    #[must_use]
     pub fn short(self) -> String {
         match self.origin_ns {
             0 => format!("{} s", digits::text(self.after_s, 7)),
@@ -78,7 +73,6 @@ impl Moment {
     /// let moment = Moment { origin_ns: 1_710_250_000_000_000_000, after_s: 0.123_456_789 };
     /// assert_eq!(moment.text(), "1710250000.123456789 s (2024-03-12T13:26:40.123456789Z)");
     /// ```
-    #[must_use]
     pub fn text(self) -> String {
         if self.origin_ns == 0 {
             return format!("{} s", digits::text(self.after_s, 12));
@@ -124,7 +118,6 @@ fn seconds(ns: i64) -> String {
 }
 
 /// Date and time in UTC from nanoseconds since 1970, if plausible: from 2000 on.
-#[must_use]
 pub fn date_and_time(ns: i64) -> Option<String> {
     const YEAR_2000_NS: i64 = 946_684_800_000_000_000;
     let (seconds, rest) = (ns / SECOND, ns % SECOND);

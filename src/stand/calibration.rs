@@ -72,7 +72,6 @@ pub struct RecordedLevels {
 
 impl Calibration {
     /// Checks of a record against this calibration.
-    #[must_use]
     pub fn levels(&self) -> RecordedLevels {
         let of = |recorded: f64| self.conversion.convert(recorded).ok();
         let of_nothing = of(0.0).unwrap_or(0.0);
@@ -93,7 +92,6 @@ impl Calibration {
 
 impl RecordedLevels {
     /// Warnings about recorded samples in SI units of the applied quantity; `scale` converts them to the printed unit.
-    #[must_use]
     pub fn warnings(&self, samples: &[f64], scale: f64, unit: &str) -> Vec<Warning> {
         let far = self.zero_far(samples, scale, unit);
         far.into_iter().chain(self.volts(samples)).collect()
@@ -151,7 +149,6 @@ const FORCE: Dimension = Dimension::new([1, 1, -2, 0, 0, 0]);
 
 impl Applied {
     /// Column heading: `torque_n_m`, `torque_ft_lbf`, `applied_v`.
-    #[must_use]
     pub fn heading(&self) -> String {
         let unit: String = self
             .unit

@@ -3,7 +3,7 @@
 use torqcomp_model::{Beam, CrossSection, Estimate, Kind, ModelError, Part, Segment};
 
 use super::section::Section;
-use super::{BeamDrawing, Friction, NamedPart};
+use super::{BeamDrawing, Friction};
 use crate::failure::Failure;
 use crate::print::short;
 use crate::warning::Warning;
@@ -194,7 +194,8 @@ fn threaded(thread: &Section, length: f64, whole: CrossSection) -> Result<Vec<Se
     })
 }
 
-pub(super) fn part(section: &Section) -> Result<NamedPart, Failure> {
+/// The inertia of a part. Its name is for readers of the file.
+pub(super) fn part(section: &Section) -> Result<Estimate, Failure> {
     let kinds = ["thin-ring", "disc", "hollow-cylinder", "point-mass"];
     let Some(kind) = section.word("kind", &kinds)? else {
         return Err(section.fail(
@@ -202,7 +203,7 @@ pub(super) fn part(section: &Section) -> Result<NamedPart, Failure> {
             format_args!("kind is missing; one of {}", kinds.join(", ")),
         ));
     };
-    let name = section.text("name")?.unwrap_or(kind).to_owned();
+    section.text("name")?;
     let mass = section.positive("mass", Kind::Mass)?;
     let keys: &[_] = match kind {
         "hollow-cylinder" => &["inner_radius", "outer_radius"],
@@ -216,10 +217,9 @@ pub(super) fn part(section: &Section) -> Result<NamedPart, Failure> {
     section.finish()?;
     let mut inputs = vec![&mass];
     inputs.extend(&radii);
-    let inertia = derived(section, Kind::Inertia, &inputs, |x| {
+    derived(section, Kind::Inertia, &inputs, |x| {
         shaped(kind, x).inertia_kg_m2()
-    })?;
-    Ok(NamedPart { name, inertia })
+    })
 }
 
 /// A part from its mass in kg and its radii in m.

@@ -148,7 +148,6 @@ impl Stand {
     }
 
     /// Record unit of the stand's mechanics: that of the static gain, or torque.
-    #[must_use]
     pub fn recorded_unit(&self) -> &str {
         self.static_gain()
             .map_or(TORQUE, |gain| gain.recorded_unit.as_str())
@@ -163,7 +162,6 @@ impl Stand {
     }
 
     /// Static gain, recorded per applied quantity, in SI units; 1 for a stand that records torque.
-    #[must_use]
     pub fn gain(&self) -> f64 {
         self.static_gain().map_or(1.0, |gain| gain.value)
     }

@@ -53,8 +53,9 @@ pub fn parse(name: &str, text: &str) -> Result<Stand, Failure> {
     check_schema(&top)?;
     let nothing = Table::new();
     let plain_recorder = Section::new(&source, "[recorder]", &nothing, None);
+    // For readers of the file.
+    top.text("name")?;
     let mut stand = Stand {
-        name: top.text("name")?.unwrap_or("unnamed stand").to_owned(),
         file: name.to_owned(),
         mechanics: mechanics(&top)?,
         calibration: one(&top, "calibration", calibration)?,

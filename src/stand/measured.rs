@@ -36,13 +36,11 @@ pub enum CalibrationLaw {
 
 impl MeasuredCalibration {
     /// The constant, if it is for volts.
-    #[must_use]
     pub fn torque_per_volt(&self) -> Option<&Estimate> {
         self.constant_of(TransducerSignal::Voltage)
     }
 
     /// The constant, if it is for this signal.
-    #[must_use]
     pub fn constant_of(&self, signal: TransducerSignal) -> Option<&Estimate> {
         match &self.law {
             CalibrationLaw::Constant(constant) if self.signal == signal => Some(constant),
@@ -51,7 +49,6 @@ impl MeasuredCalibration {
     }
 
     /// Magnitude of the signal change from no load to rated torque in SI units, if both are known.
-    #[must_use]
     pub fn change_at_rated(&self) -> Option<(TransducerSignal, f64)> {
         let CalibrationLaw::Constant(constant) = &self.law else {
             return None;
@@ -61,7 +58,6 @@ impl MeasuredCalibration {
     }
 
     /// The calibration as text.
-    #[must_use]
     pub fn described(&self, units: UnitSystem) -> String {
         match &self.law {
             CalibrationLaw::Constant(constant) => match self.signal {

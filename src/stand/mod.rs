@@ -31,7 +31,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::identify::Motion;
 use crate::warning::Warning;
 
-pub use calibration::{Applied, Calibration, RecordedLevels, applied_by_unit};
+pub use calibration::{Calibration, RecordedLevels};
 pub use effects::{DeclaredEffect, derivative};
 pub use file::{calibration_of, parse, read, recorder_of, text};
 pub(crate) use gain::gain_differs;
@@ -46,8 +46,6 @@ pub(crate) use uncertainty::{VariedConstant, combined};
 /// A stand: its mechanics, and the conversion of its record to torque.
 #[derive(Debug, Clone)]
 pub struct Stand {
-    /// Name of the stand.
-    pub name: String,
     /// Source file.
     pub file: String,
     /// Inertia, damping and stiffness.
@@ -56,8 +54,8 @@ pub struct Stand {
     pub calibration: Option<MeasuredCalibration>,
     /// Drawing of the beam.
     pub beam: Option<BeamDrawing>,
-    /// Parts that contribute to the inertia.
-    pub parts: Vec<NamedPart>,
+    /// Mass moments of inertia of its parts about the shaft.
+    pub parts: Vec<Estimate>,
     /// Friction against speed.
     pub friction: Option<Friction>,
     /// The gage.
@@ -183,15 +181,6 @@ pub struct BeamDrawing {
     pub radius: Estimate,
     /// Distance of the gage from the clamp.
     pub gage_position: Option<Estimate>,
-}
-
-/// A part with its name.
-#[derive(Debug, Clone)]
-pub struct NamedPart {
-    /// Name of the part.
-    pub name: String,
-    /// Its mass moment of inertia about the shaft.
-    pub inertia: Estimate,
 }
 
 /// A friction force proportional to speed, at a radius.

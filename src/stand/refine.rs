@@ -183,7 +183,6 @@ pub fn refine(declared: Option<(&Stand, &str)>, refined: &Refined) -> Result<Str
 }
 
 /// The SI unit of the same dimension, as text; empty if none.
-#[must_use]
 pub fn si_unit(text: &str) -> String {
     use torqcomp_model::{Kind, Unit, UnitSystem};
     let Ok(unit) = Unit::parse(text) else {

@@ -38,7 +38,6 @@ impl TransducerSignal {
     ];
 
     /// Signal with this unit; `None` for torque, plain ratios and anything else.
-    #[must_use]
     pub fn of(unit: &Unit) -> Option<Self> {
         const VOLTAGE: Dimension = Dimension::new([1, 2, -3, -1, 0, 0]);
         const CURRENT: Dimension = Dimension::new([0, 0, 0, 1, 0, 0]);
@@ -55,7 +54,6 @@ impl TransducerSignal {
     }
 
     /// Largest magnitude of such a signal in SI units, and the reason; `None` if unlimited.
-    #[must_use]
     pub fn largest(self) -> Option<(f64, &'static str)> {
         match self {
             Self::Strain => Some((
@@ -73,7 +71,6 @@ impl TransducerSignal {
     }
 
     /// Kind of the quantity.
-    #[must_use]
     pub fn kind(self) -> Kind {
         match self {
             Self::Voltage => Kind::Voltage,
@@ -86,7 +83,6 @@ impl TransducerSignal {
     }
 
     /// SI units of its kind per unit of a record.
-    #[must_use]
     pub fn factor(self, unit: &Unit) -> f64 {
         match self {
             // One hertz is a cycle of 2π rad.
@@ -96,7 +92,6 @@ impl TransducerSignal {
     }
 
     /// Customary unit, and SI units per that unit.
-    #[must_use]
     pub fn usual_unit(self) -> (&'static str, f64) {
         match self {
             Self::Voltage => ("V", 1.0),
@@ -110,7 +105,6 @@ impl TransducerSignal {
 
     /// Why a change of the output from no load to rated torque contradicts an output at no load, if it would exceed the
     /// range of such outputs; both in SI units.
-    #[must_use]
     pub fn beyond_loop(self, change: f64, zero: f64) -> Option<String> {
         let (name, largest) = match self {
             Self::Current => ("4 to 20 mA", 0.021),
@@ -131,7 +125,6 @@ impl TransducerSignal {
     }
 
     /// The unit of torque per signal, and SI units of torque per signal in it.
-    #[must_use]
     pub fn slope_unit(self, units: UnitSystem) -> (String, f64) {
         let (unit, factor) = self.usual_unit();
         let per = match unit.contains('/') {
@@ -146,7 +139,6 @@ impl TransducerSignal {
     }
 
     /// A value in SI units as text in the customary unit.
-    #[must_use]
     pub fn text(self, value: f64) -> String {
         let (unit, factor) = self.usual_unit();
         format!("{} {unit}", digits::text(value / factor, 9))

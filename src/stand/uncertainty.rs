@@ -22,13 +22,11 @@ pub enum ConstantStd {
 
 impl ConstantStd {
     /// From an optional relative standard uncertainty.
-    #[must_use]
     pub fn of(relative: Option<f64>) -> Self {
         relative.map_or(Self::Unknown, Self::Relative)
     }
 
     /// The value, if known.
-    #[must_use]
     pub fn known(self) -> Option<f64> {
         match self {
             Self::Relative(std) => Some(std),
@@ -50,7 +48,6 @@ impl Stand {
     /// Standard uncertainty of a compensated torque at a frequency: of the response alone, and combined with that of
     /// the static constant. Constants without a `std` count as exact if others have one. An uncertainty of exactly zero
     /// is treated as unknown, i.e. `None`.
-    #[must_use]
     pub fn torque_std(&self, frequency_hz: f64, constant: ConstantStd) -> TorqueStd {
         let is_known =
             |std: &InverseUncertainty| std.magnitude_relative > 0.0 || std.phase_rad > 0.0;
@@ -76,7 +73,6 @@ impl Stand {
     /// Standard uncertainty of the inverse response at a frequency: from inertia, damping and stiffness with their
     /// correlations, the effects' parameters, and the recorder's low-pass and delay. Constants without a `std` count
     /// as exact. `None` if no uncertainty is known, or if an effect without a frequency response has one.
-    #[must_use]
     pub fn inverse_uncertainty(&self, frequency_hz: f64) -> Option<InverseUncertainty> {
         let of_stand = match self.effects.is_empty() && self.constants().is_some() {
             true => self.of_mechanics(frequency_hz),

@@ -20,7 +20,6 @@ pub struct Entry {
 
 impl Entry {
     /// A quantity with its standard uncertainty and its source.
-    #[must_use]
     pub fn quantity(
         section: &'static str,
         key: &'static str,
@@ -31,7 +30,6 @@ impl Entry {
     }
 
     /// The same if the section gives the source of its numbers.
-    #[must_use]
     pub fn measured(section: &'static str, key: &'static str, estimate: &Estimate) -> Self {
         Self::with_source(section, key, estimate, None)
     }
@@ -54,19 +52,16 @@ impl Entry {
     }
 
     /// A bare number with three digits.
-    #[must_use]
     pub fn number(section: &'static str, key: &'static str, number: f64) -> Self {
         Self::text(section, key, &digits::text(number, 3))
     }
 
     /// A text.
-    #[must_use]
     pub fn text(section: &'static str, key: &'static str, text: &str) -> Self {
         Self::of(section, key, text)
     }
 
     /// `[[modes]]`, from the entries of each mode.
-    #[must_use]
     pub fn modes(modes: Vec<Vec<Self>>) -> Self {
         let mut array = Array::new();
         for entries in modes {
@@ -80,13 +75,11 @@ impl Entry {
     }
 
     /// A whole number.
-    #[must_use]
     pub fn whole(section: &'static str, key: &'static str, number: i64) -> Self {
         Self::of(section, key, number)
     }
 
     /// Points of `[calibration]`: reading, torque and its standard uncertainty, each as text.
-    #[must_use]
     pub fn points(points: &[[String; 3]]) -> Self {
         let mut array = Array::new();
         for texts in points {

@@ -53,7 +53,6 @@ impl Law {
     ];
 
     /// Name for text and JSON.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Viscous => "viscous or structural",
@@ -96,7 +95,6 @@ impl From<Law> for &'static str {
 /// // Drag alone: 2/(1 + 0.5·2·3) = 0.5.
 /// assert_eq!(envelope(2.0, 0.0, 0.5, 3.0), 0.5);
 /// ```
-#[must_use]
 pub fn envelope(start: f64, sigma: f64, quadratic: f64, time_s: f64) -> f64 {
     let fall = (-sigma * time_s).exp();
     // (1 − e^{−σt})/σ, which tends to t.

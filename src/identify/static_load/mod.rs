@@ -83,7 +83,6 @@ const SAME: f64 = 2e-3;
 const NONE: f64 = 1e-3;
 
 /// Series number of each point, for tables without them: a series ends with the return to no load.
-#[must_use]
 pub fn series_of(loads: &[f64]) -> Vec<usize> {
     let plateaus = PlateauLoads::of(loads);
     let loads = plateaus.as_ref().map_or(loads, |p| &p.loads);

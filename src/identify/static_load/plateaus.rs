@@ -34,7 +34,6 @@ pub struct PlateauLoads {
 
 impl PlateauLoads {
     /// `None` if the loads are exact, or do not stay at plateaus.
-    #[must_use]
     pub fn of(loads: &[f64]) -> Option<Self> {
         let mut steps: Vec<f64> = loads.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
         let noise = NORMAL * median(&mut steps).filter(|step| *step > 0.0)?;

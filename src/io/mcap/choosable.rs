@@ -4,7 +4,6 @@ use super::inventory::{ChannelReport, LeafReport};
 
 impl LeafReport {
     /// Its path with the first item instead of lists and arrays: `poses[].c[9].x` is `poses[0].c[0].x`.
-    #[must_use]
     pub fn first_item(&self) -> String {
         let mut pieces = self.path.split('[');
         let mut item = pieces.next().unwrap_or_default().to_owned();
@@ -20,7 +19,6 @@ impl ChannelReport {
     /// The numbers that part of a name can select, as topic and field: those of lists only by the names of their items,
     /// since otherwise any item could be meant. The description of a list (`layout` of the `MultiArray` messages of
     /// ROS) is excluded.
-    #[must_use]
     pub fn choosable(&self) -> Vec<[String; 2]> {
         let one = |leaf: &LeafReport| -> Vec<String> {
             match leaf.path.split_once('[') {

@@ -3,7 +3,6 @@
 use super::vocabulary::has;
 
 /// Whether a name means time, or the axis that is time in a recorder's export.
-#[must_use]
 pub fn is_time_name(name: &str) -> bool {
     // Us and Ms are a voltage and a torque.
     if is_weak_time_name(name) || matches!(name.trim(), "Us" | "Ms") {
@@ -40,7 +39,6 @@ pub fn is_time_name(name: &str) -> bool {
 }
 
 /// A name with a space inserted before a unit of time joined to time: `TimeMs`, `timeMillis`.
-#[must_use]
 pub fn spaced(name: &str) -> String {
     const UNITS: [&str; 9] = [
         "Ms", "MS", "Us", "US", "Ns", "Millis", "Micros", "Sec", "Seconds",
@@ -56,7 +54,6 @@ pub fn spaced(name: &str) -> String {
 
 /// Whether a name means time or a temperature or torque, like `T`, `T1` and `t2`: position and values
 /// must decide.
-#[must_use]
 pub fn is_weak_time_name(name: &str) -> bool {
     let name = name.trim();
     let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
@@ -65,7 +62,6 @@ pub fn is_weak_time_name(name: &str) -> bool {
 
 /// The word in a name that means time, in lower case and without digits, common to time columns that
 /// belong together, like `Time1` and `Time2`.
-#[must_use]
 pub fn time_stem(name: &str) -> Option<String> {
     let is_word = |c: char| c.is_alphanumeric() || c == '%';
     let lower = name.to_lowercase();
@@ -82,20 +78,17 @@ pub fn time_stem(name: &str) -> Option<String> {
 }
 
 /// Whether a word of a name means time: `Torque_Time`, `torque.time`, `t_Torque`.
-#[must_use]
 pub fn has_time_word(name: &str) -> bool {
     let mut words = name.split(|c: char| !c.is_alphanumeric());
     words.any(is_time_name)
 }
 
 /// Whether a name means the horizontal axis, which is time unless the file says otherwise.
-#[must_use]
 pub fn is_axis_name(name: &str) -> bool {
     has("axis", name.trim().to_lowercase().as_str())
 }
 
 /// Whether a name means a sample index.
-#[must_use]
 pub fn is_index_name(name: &str) -> bool {
     let name = name.trim().trim_matches('"').to_lowercase();
     // Nummer n, Index i

@@ -25,7 +25,6 @@ pub enum Cell {
 
 impl Cell {
     /// Parses a cell without surrounding quotes and spaces.
-    #[must_use]
     pub fn read(text: &str, decimal: u8) -> Self {
         if text.is_empty() {
             return Self::Empty;
@@ -61,13 +60,11 @@ impl Cell {
     }
 
     /// Whether it can be part of a data row.
-    #[must_use]
     pub fn is_datum(self) -> bool {
         !matches!(self, Self::Text | Self::Empty)
     }
 
     /// Whether it is a finite number.
-    #[must_use]
     pub fn is_number(self) -> bool {
         matches!(self, Self::Number(_) | Self::Grouped(_))
     }
@@ -93,7 +90,6 @@ fn with_plain_minus(text: &str) -> Option<String> {
 }
 
 /// Number format that prevents time stamps from being copied verbatim.
-#[must_use]
 pub fn foreign_spelling(stamps: &[f64], text: &[u8]) -> Option<&'static str> {
     if has_fortran_exponent(text) {
         return Some("its numbers have exponents of Fortran");
@@ -156,7 +152,6 @@ fn has_windows_mark(text: &str) -> bool {
 }
 
 /// Whether a cell contains a number that instruments use for a missing value.
-#[must_use]
 pub fn is_instruments_mark(text: &str) -> bool {
     let plain = text.replace(',', ".");
     text.contains(|c: char| c.is_ascii_digit())
@@ -165,7 +160,6 @@ pub fn is_instruments_mark(text: &str) -> bool {
 
 /// Whether a cell says that the input exceeded the range of the recorder: `∞`, `OVLD`, and Graphtec's `+++++++` and
 /// `-------`.
-#[must_use]
 pub fn is_over_range(text: &str) -> bool {
     let all = |sign: u8| text.len() > 3 && text.bytes().all(|byte| byte == sign);
     all(b'+') || all(b'-') || has("over range", &text.to_lowercase())

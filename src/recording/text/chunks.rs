@@ -40,7 +40,6 @@ pub enum Piece {
 
 impl Chunks {
     /// Pieces of an input.
-    #[must_use]
     pub fn new(input: Box<dyn Read + Send>) -> Self {
         Self {
             input,

@@ -36,7 +36,6 @@ pub struct ClockOrigin {
 
 impl ClockOrigin {
     /// Nanoseconds since 1970 in UTC.
-    #[must_use]
     pub fn utc(ns: i64) -> Self {
         Self {
             ns,
@@ -47,7 +46,6 @@ impl ClockOrigin {
 
 impl Clock {
     /// What this clock showed, as the origin of stamps.
-    #[must_use]
     pub fn as_origin(self) -> ClockOrigin {
         ClockOrigin {
             ns: self.total(),
@@ -57,7 +55,6 @@ impl Clock {
 
     /// Nanoseconds since 1970, or since midnight, on a clock in the zone of another origin. `None` if only this one's
     /// zone is known.
-    #[must_use]
     pub fn total_in_zone_of(self, origin: ClockOrigin) -> Option<i64> {
         let Some(own) = self.ahead_s else {
             return Some(self.total());
@@ -74,7 +71,6 @@ impl Clock {
     /// assert_eq!((clock.day, clock.nanoseconds), (Some(1), Some(1_500_000_000)));
     /// assert_eq!(Clock::parse("1.5"), None);
     /// ```
-    #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let text = text.trim();
         if let Some(clock) = Self::compact(text) {
@@ -113,7 +109,6 @@ impl Clock {
     }
 
     /// Parses fourteen digits of a date and time, with or without decimals: `20210304235958.05`.
-    #[must_use]
     pub fn compact(text: &str) -> Option<Self> {
         let (whole, decimals) = text.split_once('.').unwrap_or((text, ""));
         if whole.len() != 14 || !whole.bytes().all(|byte| byte.is_ascii_digit()) {
@@ -139,7 +134,6 @@ impl Clock {
     /// assert_eq!(Clock::iso("2025-03-14 10:11:12+01:00").unwrap(), "2025-03-14T10:11:12+01:00");
     /// assert_eq!(Clock::iso("03/04/2025 10:11:12"), None);
     /// ```
-    #[must_use]
     pub fn iso(text: &str) -> Option<String> {
         let clock = Self::parse(text)?;
         let (Some(_), Some(_), false) = (clock.day, clock.nanoseconds, is_ambiguous(text)) else {
@@ -157,7 +151,6 @@ impl Clock {
     }
 
     /// The same, or the text as written if it is ISO 8601 already.
-    #[must_use]
     pub fn iso_or_as_written(text: &str) -> String {
         let is_iso =
             text.as_bytes().get(4) == Some(&b'-') && text.as_bytes().get(10) == Some(&b'T');
@@ -167,7 +160,6 @@ impl Clock {
 
     /// Seconds after another one; the zone may change between them at the end of daylight saving
     /// time.
-    #[must_use]
     pub fn seconds_after(self, first: Self) -> f64 {
         let zones = self.ahead_s.zip(first.ahead_s);
         let ahead_s = zones.map_or(0, |(own, other)| own - other);

@@ -16,7 +16,6 @@ pub struct Dialect {
 
 impl Dialect {
     /// Cells of a line without surrounding spaces; quoted cells are unquoted.
-    #[must_use]
     pub fn cells(self, line: &str) -> Vec<String> {
         let line = line.trim_end_matches(['\r', '\n']);
         match self.delimiter {
@@ -31,7 +30,6 @@ impl Dialect {
     }
 
     /// Name for messages.
-    #[must_use]
     pub fn describe(self) -> String {
         let delimiter = match self.delimiter {
             Delimiter::Byte(b'\t') => "tab-separated".to_owned(),
@@ -86,14 +84,12 @@ fn cells_by(parser: &mut csv_core::Reader, line: &str) -> Vec<String> {
 }
 
 /// Whether a line is empty, a comment, or contains only separators.
-#[must_use]
 pub fn is_skipped(line: &str) -> bool {
     let text = line.trim();
     is_comment(text) || text.chars().all(|c| matches!(c, ',' | ';' | '\t' | ' '))
 }
 
 /// Whether a line is a comment.
-#[must_use]
 pub fn is_comment(line: &str) -> bool {
     let text = line.trim_start();
     text.starts_with(['#', '%', '!']) || text.starts_with("//")
@@ -101,7 +97,6 @@ pub fn is_comment(line: &str) -> bool {
 
 /// UTF-8, otherwise the Windows-1252 of older recorders (Latin-1 with quotation marks and dashes),
 /// in which any byte is a character.
-#[must_use]
 pub fn decode_line(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
         Ok(text) => text.to_owned(),

@@ -60,7 +60,6 @@ pub struct Table {
 }
 
 /// Whether a text begins with another, ignoring case.
-#[must_use]
 pub fn starts(text: &str, with: &str) -> bool {
     text.get(..with.len())
         .is_some_and(|start| start.eq_ignore_ascii_case(with))
@@ -68,7 +67,6 @@ pub fn starts(text: &str, with: &str) -> bool {
 
 impl Head {
     /// Lines of a text, the first of which has this number; `complete` means that no more follow.
-    #[must_use]
     pub fn of(text: &[u8], complete: bool, number: usize) -> Self {
         let mut lines = Vec::new();
         let mut offset = 0;
@@ -91,7 +89,6 @@ impl Head {
     }
 
     /// Whether a line begins with a text, ignoring case.
-    #[must_use]
     pub fn starts(&self, line: usize, with: &str) -> bool {
         self.lines
             .get(line)
@@ -99,13 +96,11 @@ impl Head {
     }
 
     /// Whether one of the first lines satisfies a predicate.
-    #[must_use]
     pub fn any(&self, is: impl Fn(&str) -> bool) -> bool {
         self.lines.iter().take(FOR_NAMES).any(|line| is(&line.text))
     }
 
     /// Number of a line in the file.
-    #[must_use]
     pub fn number(&self, line: usize) -> usize {
         self.first_number + line
     }
@@ -191,14 +186,12 @@ fn below_numbering(head: &Head, mut table: Table) -> Table {
 }
 
 /// Whether cells number the columns: `1,2,3`.
-#[must_use]
 pub fn is_numbering(cells: &[String]) -> bool {
     let mut numbered = cells.iter().zip(1_usize..);
     cells.len() > 1 && numbered.all(|(cell, number)| *cell == number.to_string())
 }
 
 /// Whether a line marks the end of the data, followed by lists of another kind.
-#[must_use]
 pub fn is_end(line: &str) -> bool {
     line.trim_end() == "EOF"
 }

@@ -11,7 +11,6 @@ use super::heading::split;
 use super::vocabulary::{has, meaning};
 
 /// Parses a unit, in brackets or not.
-#[must_use]
 pub fn read(text: &str) -> Option<NamedUnit> {
     let text = unbracketed(text);
     if says_none(text) || text.chars().count() > 24 {
@@ -44,7 +43,6 @@ fn says_none(text: &str) -> bool {
 }
 
 /// A unit as written, if the cell contains one at all.
-#[must_use]
 pub fn as_written(text: &str) -> Option<String> {
     let text = unbracketed(text);
     (!says_none(text) && text.chars().count() <= 40).then(|| text.to_owned())
@@ -62,7 +60,6 @@ fn unbracketed(text: &str) -> &str {
 }
 
 /// Whether a text is wholly in brackets.
-#[must_use]
 pub fn is_bracketed(text: &str) -> bool {
     let text = text.trim();
     text.len() > 2 && unbracketed(text).len() < text.len() && !text.starts_with('"')
@@ -81,7 +78,6 @@ pub struct Heading {
 
 /// Parses a heading: the formats of [`split`], and `C1 in V`, `U/V`, `Kraft, N`, `Torque Nm`, a
 /// unit in brackets before other words, unknown units in square brackets.
-#[must_use]
 pub fn heading(text: &str) -> Heading {
     // "Zeit" t / s
     let unquoted = text.replace('"', "");
@@ -276,7 +272,6 @@ fn bracket(text: &str) -> Option<(String, &str)> {
 
 /// Seconds per unit of time with a factor in a heading: 0.01 for `Zeit [1/100 s]`, `Zeit in 1/100 s`, `Zeit x10ms` and
 /// `Time (s) x1e-2`. Not for `Time [s] x 1000`, whose numbers may be milliseconds as well.
-#[must_use]
 pub fn scaled_time(heading: &str) -> Option<f64> {
     let mut parts = heading.split(['[', '(', ']', ')']).skip(1);
     let (inside, behind) = (parts.next(), parts.next());
@@ -301,7 +296,6 @@ pub fn scaled_time(heading: &str) -> Option<f64> {
 }
 
 /// Whether it is a unit of time.
-#[must_use]
 pub fn is_time(unit: &NamedUnit) -> bool {
     unit.unit.dimension() == Dimension::new([0, 0, 1, 0, 0, 0])
 }

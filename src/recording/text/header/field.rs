@@ -41,7 +41,6 @@ pub(super) fn without_name<'a>(unit: &'a str, name: &str) -> &'a str {
 
 impl Field {
     /// A column without a heading, with its index from 0.
-    #[must_use]
     pub fn unnamed(place: usize) -> Self {
         let name = format!("column {}", place + 1);
         Self {
@@ -54,7 +53,6 @@ impl Field {
     }
 
     /// A column with a heading, and a unit in a separate row.
-    #[must_use]
     pub fn new(heading: &str, unit: Option<&str>) -> Self {
         let unquoted = heading.replace('"', "");
         let heading = unquoted.trim();
@@ -90,7 +88,6 @@ impl Field {
     }
 
     /// A column whose heading is only a name.
-    #[must_use]
     pub fn with_unit(name: &str, unit: Option<&str>) -> Self {
         let unit = unit.map(|unit| without_name(unit, name));
         Self {
@@ -112,13 +109,11 @@ impl Field {
     }
 
     /// Whether its unit is a unit of time.
-    #[must_use]
     pub fn has_time_unit(&self) -> bool {
         self.unit.as_ref().is_some_and(units::is_time)
     }
 
     /// Whether it is named like time, or has an axis name with a unit of time: `T1 [s]`, `X [s]`.
-    #[must_use]
     pub fn is_named_time(&self) -> bool {
         let can_be = || units::is_axis_name(&self.name) || units::is_weak_time_name(&self.name);
         match self.has_time_unit() {

@@ -52,7 +52,6 @@ struct Row<'a> {
 }
 
 /// Parses the lines above a table; `used` marks the columns with data in the first rows.
-#[must_use]
 pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
     let rows: Vec<Row> = head.lines[..table.first]
         .iter()

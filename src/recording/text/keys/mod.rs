@@ -61,13 +61,11 @@ impl Topic {
 
 impl Entry {
     /// Topic of its key.
-    #[must_use]
     pub fn topic(&self) -> Option<Topic> {
         topic(&self.key)
     }
 
     /// Its first nonempty value.
-    #[must_use]
     pub fn value(&self) -> Option<&str> {
         self.values
             .iter()
@@ -77,7 +75,6 @@ impl Entry {
 }
 
 /// Entries of a line: one for its key and values, or one for each cell `key = value`.
-#[must_use]
 pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
     let text = text
         .trim()

@@ -7,7 +7,6 @@ use crate::recording::text::units;
 use crate::recording::text::vocabulary::meaning;
 
 /// A number with a unit: `1.00E+09 Sa/s`, `20ms`, `1,000 Hz`, `10 000 Hz`.
-#[must_use]
 pub fn quantity(text: &str, decimal: u8) -> Option<(f64, String)> {
     let text = text.trim().trim_matches('"').trim();
     let end = text
@@ -66,7 +65,6 @@ fn hertz(value: f64, unit: &str, is_interval: bool) -> Option<f64> {
 }
 
 /// Rate in Hz from an entry, at an index among its values (otherwise from the first nonempty one).
-#[must_use]
 pub fn rate_hz(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> {
     let is_interval = match entry.topic()? {
         Topic::Rate => false,
@@ -98,7 +96,6 @@ pub fn rate_hz(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> 
 }
 
 /// Whether a unit is given with the first value of an entry.
-#[must_use]
 pub fn has_unit(entry: &Entry, decimal: u8) -> bool {
     let mut values = entry.values.iter().filter(|value| !value.is_empty());
     let own = values.next().and_then(|value| quantity(value, decimal));
@@ -119,7 +116,6 @@ fn of_first_channel(value: &str) -> &str {
 }
 
 /// Seconds given by an entry.
-#[must_use]
 pub fn seconds(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> {
     let text = match place {
         Some(place) => entry.values.get(place)?.as_str(),
@@ -151,7 +147,6 @@ fn in_brackets(text: &str) -> Option<&str> {
 }
 
 /// Date and time of the record from the entries.
-#[must_use]
 pub fn date_text(entries: &[Entry]) -> Option<String> {
     let (mut date, mut time) = (None, None);
     for entry in entries {

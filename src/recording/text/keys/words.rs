@@ -4,19 +4,16 @@ use super::Topic;
 use crate::recording::text::vocabulary::{has, meaning, words};
 
 /// Whether a key that may concern the rate more often concerns the signal.
-#[must_use]
 pub fn is_vague(key: &str) -> bool {
     has("vague keys", without_brackets(&key.to_lowercase()))
 }
 
 /// Whether the rate given by a key may be that of all channels together, or before some samples are left out.
-#[must_use]
 pub fn is_of_others(key: &str) -> bool {
     contains_any("rates of others", key)
 }
 
 /// Whether a key says how many samples were left out.
-#[must_use]
 pub fn is_thinning(key: &str) -> bool {
     contains_any("thinning", key)
 }
@@ -27,7 +24,6 @@ fn contains_any(section: &str, key: &str) -> bool {
 }
 
 /// Topic of a key.
-#[must_use]
 pub fn topic(key: &str) -> Option<Topic> {
     let whole = key.to_lowercase();
     let bare = without_brackets(&whole);

@@ -84,7 +84,6 @@ impl Maker {
 }
 
 /// The maker of a file.
-#[must_use]
 pub fn recognise(head: &Head) -> Option<Maker> {
     let ruled = RULES.iter().copied().flatten().find(|(_, is)| is(head));
     ruled

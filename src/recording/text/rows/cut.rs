@@ -57,7 +57,6 @@ impl Rows {
     }
 
     /// Number of the line of a row.
-    #[must_use]
     pub fn line_of(&self, row: usize) -> usize {
         line_of(&self.breaks, row)
     }
