@@ -18,6 +18,8 @@ pub(super) struct Set {
     pub blocks: Vec<Block>,
     /// Number of lines, from 0 to half the sampling rate.
     pub lines: usize,
+    /// The lines that are fitted.
+    pub band: Range<usize>,
     /// Powers summed over all blocks.
     pub powers: Powers,
     /// Record of each block.
@@ -40,6 +42,7 @@ impl Set {
         Self {
             powers: Powers::of(blocks.iter(), 0..usize::MAX),
             lines: blocks.first().map_or(0, |block| block.applied.len()),
+            band: 0..0,
             blocks,
             record,
             step_hz,
@@ -51,23 +54,23 @@ impl Set {
         }
     }
 
-    /// Drops the lines of segments of noise from a number on, which may be most of the memory. Those of the single
+    /// Drops the lines of segments of noise above the band, which may be most of the memory. Those of the single
     /// blocks of other excitations show the error of the force.
-    pub fn keep_lines(&mut self, end: usize) {
+    pub fn drop_lines_above(&mut self) {
         if self.window != Window::Hann {
             return;
         }
         for block in &mut self.blocks {
             for channel in [&mut block.applied, &mut block.measured] {
-                channel.truncate(end);
+                channel.truncate(self.band.end);
                 channel.shrink_to_fit();
             }
         }
     }
 
-    /// Mean relative error over all blocks of a response given at the lines.
-    pub fn error(&self, response: &[Complex64], lines: &Range<usize>) -> f64 {
-        let error = |block| frf::prediction_error(response, block, lines.clone());
+    /// Mean relative error over all blocks of a response given at the lines of the band.
+    pub fn error(&self, response: &[Complex64]) -> f64 {
+        let error = |block| frf::prediction_error(response, block, self.band.clone());
         self.blocks.iter().map(error).sum::<f64>() / self.blocks.len() as f64
     }
 }

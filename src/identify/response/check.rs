@@ -2,7 +2,6 @@
 
 use super::Driven;
 use super::blocks::Set;
-use super::lines::Lines;
 use super::{FinalFit, Modal};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::Identification;
@@ -55,10 +54,11 @@ const IN_PHASE: f64 = 0.02;
 
 /// Whether the measured signal leads at nearly all lines. A driving-point response lags: the imaginary part of ω^−m
 /// j^−m H is negative. Otherwise the channels are swapped or one has the wrong sign.
-pub(super) fn leads(set: &Set, lines: &Lines, order: i32) -> bool {
+pub(super) fn leads(set: &Set, order: i32) -> bool {
     let h1 = set.powers.response(Estimator::H1);
     let turn = num_complex::Complex64::I.powi(-order);
-    let sides: Vec<bool> = lines
+    let sides: Vec<bool> = set
+        .band
         .clone()
         .filter(|k| h1.coherence[*k] > 0.5)
         .map(|k| h1.response[k] * turn)

@@ -8,7 +8,6 @@ use num_complex::Complex64;
 use torqcomp_dsp::frf::Estimator;
 
 use super::blocks::Set;
-use super::lines::Lines;
 use super::{Driven, shift};
 use crate::failure::Failure;
 use crate::identify::{Identification, NamedEstimate};
@@ -25,16 +24,16 @@ const AS_GOOD: f64 = 1.02;
 ///
 /// The impulse response `h(τ) = Σ H(f) e^{j2πfτ}` of the band begins there. Its envelope is that of the analytic signal,
 /// from the same sum with `−jH`.
-pub(super) fn lag(set: &Set, lines: &Lines) -> isize {
+pub(super) fn lag(set: &Set) -> isize {
     let frf = set.powers.response(Estimator::H1);
     let count = 2 * (set.lines - 1);
-    let share = |k: usize| (k - lines.start) as f64 / lines.len() as f64;
+    let share = |k: usize| (k - set.band.start) as f64 / set.band.len() as f64;
     // Tapered towards the top of the band, so that it does not ring.
     let weight = |k: usize| frf.coherence[k] * (0.5 * PI * share(k)).cos().powi(2);
     let inverse = torqcomp_fourier::inverse(count);
     let transformed = |turn: Complex64| {
         let mut spectrum = inverse.make_input_vec();
-        for k in lines.clone() {
+        for k in set.band.clone() {
             spectrum[k] = turn * weight(k) * frf.response[k];
         }
         let mut impulse = inverse.make_output_vec();
@@ -59,8 +58,8 @@ pub(super) fn lag(set: &Set, lines: &Lines) -> isize {
         false => begins,
     };
     let size = |k: &usize| weight(*k) * frf.response[*k].norm();
-    let strongest = lines.clone().max_by(|a, b| size(a).total_cmp(&size(b)));
-    let period = count as f64 / strongest.unwrap_or(lines.start) as f64;
+    let strongest = set.band.clone().max_by(|a, b| size(a).total_cmp(&size(b)));
+    let period = count as f64 / strongest.unwrap_or(set.band.start) as f64;
     match (lag.unsigned_abs() as f64) < PERIODS * period {
         true => 0,
         false => lag,

@@ -13,7 +13,6 @@ use num_complex::Complex64;
 use torqcomp_dsp::frf::Window;
 
 use super::blocks::Set;
-use super::lines::Lines;
 use super::scatter::{applied_power, line_correlation};
 
 /// Number of lines on each side over which the power of the errors is averaged.
@@ -25,18 +24,18 @@ const DIFFERENT: f64 = 2.0;
 
 /// s_k of each line; `power` is the mean power of the residuals over the `counted` lines.
 pub(super) fn sizes(
-    (set, lines): (&Set, &Lines),
+    set: &Set,
     weight: &[f64],
     response: &[Complex64],
     (power, counted): (f64, usize),
 ) -> Vec<f64> {
-    let of_lines = without_strokes(set, lines, response);
+    let of_lines = without_strokes(set, response);
     let (variances, of_force) = match of_lines {
         Some(variances) => (
             variances,
-            of_force(set, lines, weight, response) / counted.max(1) as f64,
+            of_force(set, weight, response) / counted.max(1) as f64,
         ),
-        None => (lines.clone().map(|k| variance(set, k)).collect(), 0.0),
+        None => (set.band.clone().map(|k| variance(set, k)).collect(), 0.0),
     };
     let pairs = variances.iter().zip(weight);
     let scattered: Vec<f64> = pairs.map(|(variance, w)| w * w * variance).collect();
@@ -83,11 +82,11 @@ fn variance(set: &Set, line: usize) -> f64 {
 }
 
 /// The same without what is smooth over the lines; `None` without strokes, or if neighbouring lines hardly differ.
-fn without_strokes(set: &Set, lines: &Lines, response: &[Complex64]) -> Option<Vec<f64>> {
+fn without_strokes(set: &Set, response: &[Complex64]) -> Option<Vec<f64>> {
     let length = 2 * (set.blocks.first()?.applied.len() - 1);
     let [near, far] = [1, 2].map(|lag| line_correlation(set.window, lag, length).re);
     let unit = 6.0 - 8.0 * near + 2.0 * far;
-    let count = lines.len();
+    let count = set.band.len();
     if set.strokes.is_empty()
         || unit < DIFFERENT
         || count < 3
@@ -95,9 +94,9 @@ fn without_strokes(set: &Set, lines: &Lines, response: &[Complex64]) -> Option<V
     {
         return None;
     }
-    let power = applied_power(set, lines);
+    let power = applied_power(set);
     let h1 = |k: usize| {
-        let line = lines.start + k;
+        let line = set.band.start + k;
         let products = set
             .blocks
             .iter()
@@ -108,7 +107,7 @@ fn without_strokes(set: &Set, lines: &Lines, response: &[Complex64]) -> Option<V
     let mut sums = vec![0.0; count];
     for block in &set.blocks {
         let error = |k: usize| {
-            let line = lines.start + k;
+            let line = set.band.start + k;
             (block.measured[line] - h1[k] * block.applied[line]) / response[k]
         };
         let errors: Vec<Complex64> = (0..count).map(error).collect();
@@ -127,9 +126,9 @@ fn without_strokes(set: &Set, lines: &Lines, response: &[Complex64]) -> Option<V
 }
 
 /// Sum over the lines of the power of the weighted errors from the noise of the force within the strokes.
-fn of_force(set: &Set, lines: &Lines, weight: &[f64], response: &[Complex64]) -> f64 {
+fn of_force(set: &Set, weight: &[f64], response: &[Complex64]) -> f64 {
     let length = 2 * (set.blocks[0].applied.len() - 1);
-    let power = applied_power(set, lines);
+    let power = applied_power(set);
     let mut sum = 0.0;
     for (b, stroke) in &set.strokes {
         let weights = stroke
@@ -137,7 +136,12 @@ fn of_force(set: &Set, lines: &Lines, weight: &[f64], response: &[Complex64]) ->
             .clone()
             .map(|i| set.window.weight(i, length).powi(2));
         let of_stroke = stroke.variance * weights.sum::<f64>();
-        for (k, line) in lines.clone().enumerate().filter(|(k, _)| power[*k] > 0.0) {
+        for (k, line) in set
+            .band
+            .clone()
+            .enumerate()
+            .filter(|(k, _)| power[*k] > 0.0)
+        {
             let share = set.blocks[*b].applied[line].norm_sqr() / power[k].powi(2);
             sum += weight[k].powi(2) * response[k].norm_sqr() * share * of_stroke;
         }

@@ -1,6 +1,7 @@
 //! Fitted lines of a response, and their weights.
 
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 use torqcomp_dsp::frf::{Estimator, Powers};
 
@@ -9,22 +10,19 @@ use super::{Data, ResponseOptions};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::{plural, short};
 
-/// Lines of a band.
-pub(super) type Lines = std::ops::Range<usize>;
-
 /// Minimum power of an excited line, relative to the strongest.
 const EXCITES: f64 = 1e-3;
 
-/// The blocks with the lines that are used, and the lines of the band.
-pub(super) fn in_band(mut set: Set, options: &ResponseOptions) -> Result<(Set, Lines), Failure> {
-    let lines = band(&set, options)?;
-    set.keep_lines(lines.end);
-    Ok((set, lines))
+/// The blocks with the band that is fitted.
+pub(super) fn in_band(mut set: Set, options: &ResponseOptions) -> Result<Set, Failure> {
+    set.band = band(&set, options)?;
+    set.drop_lines_above();
+    Ok(set)
 }
 
 /// The given band, or the excited lines. A step has most of its power at the lowest lines, whatever it excites; so for
 /// transients the power of their differences counts, and at most as many lines as can be fitted.
-fn band(set: &Set, options: &ResponseOptions) -> Result<Lines, Failure> {
+fn band(set: &Set, options: &ResponseOptions) -> Result<Range<usize>, Failure> {
     let lines = set.lines;
     let frf = set.powers.response(Estimator::H1);
     let (from, to) = match options.band_hz {
@@ -91,7 +89,7 @@ pub(super) const MOST_LINES: usize = 6000;
 const SUGGESTED: usize = 5800;
 
 /// The band of [`SUGGESTED`] lines in which the measured signal has most power.
-pub(super) fn strongest(set: &Set, lines: &Lines) -> (usize, usize) {
+pub(super) fn strongest(set: &Set, lines: &Range<usize>) -> (usize, usize) {
     let powers: Vec<f64> = lines.clone().map(|k| measured_power(set, k)).collect();
     let mut sum: f64 = powers[..SUGGESTED].iter().sum();
     let mut best = (sum, 0);
@@ -106,13 +104,14 @@ pub(super) fn strongest(set: &Set, lines: &Lines) -> (usize, usize) {
 }
 
 /// H1, with each line weighted by the square root of its applied power.
-pub(super) fn data(powers: &Powers, set: &Set, lines: &Lines, options: &ResponseOptions) -> Data {
+pub(super) fn data(powers: &Powers, set: &Set, options: &ResponseOptions) -> Data {
     let frf = powers.response(Estimator::H1);
-    let response = frf.response[lines.clone()].to_vec();
-    let powers = &frf.applied_power[lines.clone()];
+    let response = frf.response[set.band.clone()].to_vec();
+    let powers = &frf.applied_power[set.band.clone()];
     let mean = powers.iter().sum::<f64>() / powers.len() as f64;
     Data {
-        omega: lines
+        omega: set
+            .band
             .clone()
             .map(|k| TAU * k as f64 * set.step_hz)
             .collect(),

@@ -28,7 +28,6 @@ use super::mode::all_or_none;
 use super::{Identification, ModalPole};
 use crate::failure::{ErrorCode, Failure};
 use blocks::Set;
-use lines::Lines;
 pub use modal::Lag;
 use modal::{Data, Effort, Modal};
 pub(crate) use present::RATIO;
@@ -119,9 +118,9 @@ fn behind(records: &[Driven], options: &ResponseOptions) -> Result<Identificatio
         let set = blocks::blocks(records, options, &mut result)?;
         Ok((result, lines::in_band(set, options)?))
     };
-    let (result, (set, lines)) = cut(records)?;
-    let lag = late::lag(&set, &lines);
-    let as_recorded = evaluate(records, options, (set, lines), result);
+    let (result, set) = cut(records)?;
+    let lag = late::lag(&set);
+    let as_recorded = evaluate(records, options, set, result);
     if lag == 0 {
         return as_recorded;
     }
@@ -130,7 +129,7 @@ fn behind(records: &[Driven], options: &ResponseOptions) -> Result<Identificatio
         lag: Some(Lag::Delay),
         ..*options
     };
-    let found = cut(&aligned).and_then(|(result, of)| evaluate(&aligned, &with_rest, of, result));
+    let found = cut(&aligned).and_then(|(result, set)| evaluate(&aligned, &with_rest, set, result));
     late::better(as_recorded, found, lag as f64 / records[0].rate_hz)
 }
 
@@ -138,15 +137,15 @@ fn behind(records: &[Driven], options: &ResponseOptions) -> Result<Identificatio
 fn evaluate(
     records: &[Driven],
     options: &ResponseOptions,
-    (set, lines): (Set, Lines),
+    set: Set,
     mut result: Identification,
 ) -> Result<Identification, Failure> {
-    let leads = check::leads(&set, &lines, options.order);
-    let data = lines::data(&set.powers, &set, &lines, options);
+    let leads = check::leads(&set, options.order);
+    let data = lines::data(&set.powers, &set, options);
     // The transforms of whole records take about as long as the search for the number of modes.
     let (found, whole) = std::thread::scope(|scope| {
         let whole = scope.spawn(|| whole::Whole::of(records, &set, &data));
-        let found = order::order(&set, &lines, options, &data, &result.warnings);
+        let found = order::order(&set, options, &data, &result.warnings);
         (found, whole.join().expect("a transform does not panic"))
     });
     let (coarse, held_out) = found.map_err(|failure| match leads {
@@ -154,7 +153,7 @@ fn evaluate(
         false => failure,
     })?;
     let asked = options.lag;
-    let late = shift::of((&set, &lines), options, (&data, &coarse))?;
+    let late = shift::of(&set, options, (&data, &coarse))?;
     let options = &options.with_lag_of(late.as_ref());
     let coarse = late.unwrap_or(coarse);
     let is_grounded = options.grounded && coarse.poles.len() > 1;
@@ -163,10 +162,9 @@ fn evaluate(
         below: !is_grounded,
         ..data
     };
-    let of = (&set, &lines);
     let kinds = (leads, is_grounded, options.band_hz.is_some());
     let coarse = determined::determined((&set, &data), coarse, kinds, &mut result)?;
-    let fitted = final_fit(whole, of, options, (&data, &coarse), &mut result)?;
+    let fitted = final_fit(whole, &set, options, (&data, &coarse), &mut result)?;
     let is_poor = fitted.relative.is_nan() || fitted.relative >= check::POOR;
     if order::is_unexplained(&held_out) && is_poor {
         return Err(order::unexplained());
@@ -185,14 +183,14 @@ fn evaluate(
         present::add_shares(&mut result);
     }
     check::doubts(&mut result, &fitted, leads);
-    result.fit = Some(present::quality(&set, &lines, &fitted));
+    result.fit = Some(present::quality(&set, &fitted));
     result.held_out_errors = match fitted.modal.delay_s == 0.0 || asked == Some(fitted.modal.lag) {
         true => held_out,
-        false => order::of_given(&set, &lines, options, &fitted.modal)?,
+        false => order::of_given(&set, options, &fitted.modal)?,
     };
-    present::method(&mut result, &set, &lines, options, &fitted.modal);
+    present::method(&mut result, &set, options, &fitted.modal);
     present::other_constants(&mut result, &set, options, &fitted);
-    present::spectra(&mut result, &set, &lines, &fitted.modal);
+    present::spectra(&mut result, &set, &fitted.modal);
     Ok(result)
 }
 
@@ -255,7 +253,7 @@ const ONE_HIT: &str = "a single hit does not show the error of its force (noise 
 /// response.
 fn final_fit(
     mut whole: Option<whole::Whole>,
-    (set, lines): (&Set, &Lines),
+    set: &Set,
     options: &ResponseOptions,
     (data, coarse): (&Data, &Modal),
     result: &mut Identification,
@@ -274,15 +272,15 @@ fn final_fit(
         let late = shift::of_whole(whole, set, options, (data, &fitted))?;
         return shift::filtered_whole(whole, set, data, late.unwrap_or(fitted));
     }
-    let (data, mut modal) = shift::filtered((set, lines), data, coarse)?;
+    let (data, mut modal) = shift::filtered(set, data, coarse)?;
     let data = &data;
     check::leakage(result, set, &modal);
     let searched = modal.fit.as_ref().map_or(0, |fit| fit.values.len());
-    if scatter::is_of_force(set, lines, data, &modal) {
+    if scatter::is_of_force(set, data, &modal) {
         result.warn("one-hit", ONE_HIT);
     }
-    let all = scatter::of_all(set, lines, data, &modal)?;
-    let of_poles = scatter::of_poles(set, lines, data, &modal)?;
+    let all = scatter::of_all(set, data, &modal)?;
+    let of_poles = scatter::of_poles(set, data, &modal)?;
     if data.lag.is_some() {
         modal.delay_std_s = of_poles.std(2 * modal.poles.len());
     }
@@ -296,7 +294,7 @@ fn final_fit(
         has_residues: all.is_some() || modal.poles.len() == 1,
         covariance: all.unwrap_or(of_poles),
         linear: searched,
-        relative: set.error(&modal.response, lines),
+        relative: set.error(&modal.response),
         gain_error: 0.0,
         criterion: f64::INFINITY,
         residual: Vec::new(),

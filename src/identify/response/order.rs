@@ -3,7 +3,7 @@
 use torqcomp_dsp::frf::{self, Estimator, Powers, Window};
 
 use super::blocks::Set;
-use super::lines::{self, Lines, MOST_LINES, data};
+use super::lines::{self, MOST_LINES, data};
 use super::whole::Whole;
 use super::{Data, Effort, FinalFit, Modal, ResponseOptions, determined, shift};
 use crate::failure::{ErrorCode, Failure};
@@ -66,31 +66,30 @@ pub(super) fn folds(set: &Set) -> Vec<Vec<usize>> {
 /// given, only its error. `said` are the warnings so far.
 pub(super) fn order(
     set: &Set,
-    lines: &Lines,
     options: &ResponseOptions,
     data: &Data,
     said: &[Warning],
 ) -> Result<(Modal, Vec<f64>), Failure> {
     let folds = folds(set);
-    if lines.len() > MOST_LINES {
-        let (from, to) = lines::strongest(set, lines);
+    if set.band.len() > MOST_LINES {
+        let (from, to) = lines::strongest(set, &set.band);
         return Err(ErrorCode::TooManySamples.failed(format_args!(
             "{} lines in the band, more than {MOST_LINES}; narrow it to where the response is strongest: \
          --band {}..{}",
-            lines.len(),
+            set.band.len(),
             rounded(from as f64 * set.step_hz, 4),
             rounded(to as f64 * set.step_hz, 4)
         )));
     }
     if let Some(modes) = options.modes {
         let all = grown(data, options, modes)?;
-        let errors = of_given(set, lines, options, &all)?;
+        let errors = of_given(set, options, &all)?;
         return Ok((all, errors));
     }
     if folds.len() < 2 {
         return Err(one_block(said));
     }
-    let errors = tried(set, lines, options, &folds)?;
+    let errors = tried(set, options, &folds)?;
     // Leakage may hide a mode in blocks, but not in whole records.
     let best = match (fewest(&errors), set.window) {
         (0, Window::Hann) if errors.len() > 1 => least_of_some(&errors),
@@ -211,26 +210,21 @@ pub(super) fn best_of_whole(
 }
 
 /// Data of each fold: all blocks except those held out.
-fn training(
-    set: &Set,
-    lines: &Lines,
-    options: &ResponseOptions,
-    folds: &[Vec<usize>],
-) -> Vec<Data> {
+fn training(set: &Set, options: &ResponseOptions, folds: &[Vec<usize>]) -> Vec<Data> {
     folds
         .iter()
         .map(|fold| {
             let held_out = Powers::of(fold.iter().map(|i| &set.blocks[*i]), 0..usize::MAX);
-            data(&set.powers.without(&held_out), set, lines, options)
+            data(&set.powers.without(&held_out), set, options)
         })
         .collect()
 }
 
 /// Mean error of each fold's model on its hold-out blocks.
-fn held_out(set: &Set, lines: &Lines, folds: &[Vec<usize>], models: &[Modal]) -> f64 {
+fn held_out(set: &Set, folds: &[Vec<usize>], models: &[Modal]) -> f64 {
     let each = models.iter().zip(folds).flat_map(|(model, fold)| {
         fold.iter()
-            .map(|i| frf::prediction_error(&model.response, &set.blocks[*i], lines.clone()))
+            .map(|i| frf::prediction_error(&model.response, &set.blocks[*i], set.band.clone()))
     });
     each.sum::<f64>() / set.blocks.len() as f64
 }
@@ -238,42 +232,36 @@ fn held_out(set: &Set, lines: &Lines, folds: &[Vec<usize>], models: &[Modal]) ->
 /// Hold-out error for the number of modes of the fit to all blocks only.
 pub(super) fn of_given(
     set: &Set,
-    lines: &Lines,
     options: &ResponseOptions,
     all: &Modal,
 ) -> Result<Vec<f64>, Failure> {
     let mut errors = vec![f64::NAN; all.poles.len() + 1];
     let folds = folds(set);
     if folds.len() > 1 {
-        let training = training(set, lines, options, &folds);
+        let training = training(set, options, &folds);
         let models = side_by_side(&training, |data, _| {
             Ok(data.fit(&all.poles, all.delay_s, Effort::Coarse)?)
         })?;
-        errors[all.poles.len()] = held_out(set, lines, &folds, &models);
+        errors[all.poles.len()] = held_out(set, &folds, &models);
     }
     Ok(errors)
 }
 
 /// Hold-out errors for 0, 1, 2, … modes, until more do not help.
-fn tried(
-    set: &Set,
-    lines: &Lines,
-    options: &ResponseOptions,
-    folds: &[Vec<usize>],
-) -> Result<Vec<f64>, Failure> {
-    let most = MOST_MODES.min(lines.len() / 6);
-    let training = training(set, lines, options, folds);
+fn tried(set: &Set, options: &ResponseOptions, folds: &[Vec<usize>]) -> Result<Vec<f64>, Failure> {
+    let most = MOST_MODES.min(set.band.len() / 6);
+    let training = training(set, options, folds);
     let mut models: Vec<Modal> = training
         .iter()
         .map(|d| d.fit(&[], 0.0, Effort::Coarse))
         .collect::<Result<_, _>>()?;
-    let error = |models: &[Modal]| held_out(set, lines, folds, models);
+    let error = |models: &[Modal]| held_out(set, folds, models);
     let mut errors = vec![error(&models)];
     let mut since = 0;
     // The error of the response itself, one parameter per line, is a lower bound: once it is reached, more modes would
     // not be chosen.
-    let raw = &set.powers.response(Estimator::H1).response[lines.clone()];
-    let floor = set.error(raw, lines);
+    let raw = &set.powers.response(Estimator::H1).response[set.band.clone()];
+    let floor = set.error(raw);
     let settled = |errors: &[f64]| errors.iter().any(|e| *e <= SLACK * floor);
     while errors.len() <= most && since < PATIENCE && !settled(&errors) {
         models = side_by_side(&training, |data, fold| {

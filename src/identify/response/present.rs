@@ -4,7 +4,6 @@ use num_complex::Complex64;
 use torqcomp_dsp::frf::{self, Estimator, Frf, Window};
 
 use super::blocks::Set;
-use super::lines::Lines;
 use super::order::folds;
 use super::{FinalFit, Lag, Modal, ResponseOptions, foreign, shift};
 use crate::chart::{Chart, Series};
@@ -49,16 +48,15 @@ pub(super) fn add_shares(result: &mut Identification) {
 pub(super) fn method(
     result: &mut Identification,
     set: &Set,
-    lines: &Lines,
     options: &ResponseOptions,
     fitted: &Modal,
 ) {
     result.method.push(format!(
         "{} fitted to {} lines from {} to {} Hz, H1 over {}, {}{}",
         plural(fitted.poles.len(), "mode"),
-        lines.len(),
-        short(lines.start as f64 * set.step_hz),
-        short((lines.end - 1) as f64 * set.step_hz),
+        set.band.len(),
+        short(set.band.start as f64 * set.step_hz),
+        short((set.band.end - 1) as f64 * set.step_hz),
         plural(set.blocks.len(), "block"),
         match fitted.linear().len() > 2 * fitted.poles.len() + 1 {
             true => "residual terms for modes outside the band",
@@ -108,12 +106,12 @@ pub(super) fn other_constants(
 }
 
 /// How well a model follows the measured signal in the band, in the rms over all blocks.
-pub(super) fn quality(set: &Set, lines: &Lines, fitted: &FinalFit) -> FitQuality {
+pub(super) fn quality(set: &Set, fitted: &FinalFit) -> FitQuality {
     let power: f64 = set
         .blocks
         .iter()
         .map(|b| {
-            b.measured[lines.clone()]
+            b.measured[set.band.clone()]
                 .iter()
                 .map(|y| y.norm_sqr())
                 .sum::<f64>()
@@ -129,14 +127,14 @@ pub(super) fn quality(set: &Set, lines: &Lines, fitted: &FinalFit) -> FitQuality
 }
 
 /// Adds results of the response itself: its error, its levels, its plots.
-pub(super) fn spectra(result: &mut Identification, set: &Set, lines: &Lines, fitted: &Modal) {
-    raw_error(result, set, lines);
-    levels(result, set, lines);
-    draw(result, set, lines, fitted);
+pub(super) fn spectra(result: &mut Identification, set: &Set, fitted: &Modal) {
+    raw_error(result, set);
+    levels(result, set);
+    draw(result, set, fitted);
 }
 
 /// Adds the hold-out error of the measured response itself, without a model.
-fn raw_error(result: &mut Identification, set: &Set, lines: &Lines) {
+fn raw_error(result: &mut Identification, set: &Set) {
     let folds = folds(set);
     if folds.len() < 2 {
         return;
@@ -146,10 +144,10 @@ fn raw_error(result: &mut Identification, set: &Set, lines: &Lines) {
         let others = (0..set.blocks.len())
             .filter(|i| !fold.contains(i))
             .map(|i| &set.blocks[i]);
-        let raw = Frf::between(others, Estimator::H1, lines.clone()).response;
+        let raw = Frf::between(others, Estimator::H1, set.band.clone()).response;
         sum += fold
             .iter()
-            .map(|i| frf::prediction_error(&raw, &set.blocks[*i], lines.clone()))
+            .map(|i| frf::prediction_error(&raw, &set.blocks[*i], set.band.clone()))
             .sum::<f64>();
     }
     let percent = 100.0 * sum / set.blocks.len() as f64;
@@ -168,7 +166,7 @@ fn raw_error(result: &mut Identification, set: &Set, lines: &Lines) {
 const DIFFERENT: f64 = 0.1;
 
 /// Compares the responses of records at different levels, which are equal for a linear stand.
-fn levels(result: &mut Identification, set: &Set, lines: &Lines) {
+fn levels(result: &mut Identification, set: &Set) {
     let mut records = set.record.clone();
     records.dedup();
     let of = |r: usize| {
@@ -182,13 +180,13 @@ fn levels(result: &mut Identification, set: &Set, lines: &Lines) {
     let first = of(*first);
     for r in others {
         let other = of(*r);
-        let level = |f: &Frf| f.applied_power[lines.clone()].iter().sum::<f64>().sqrt();
+        let level = |f: &Frf| f.applied_power[set.band.clone()].iter().sum::<f64>().sqrt();
         let ratio = level(&other) / level(&first);
         if (0.7..1.4).contains(&ratio) {
             continue;
         }
         let (mut change, mut all) = (0.0, 0.0);
-        for k in lines.clone() {
+        for k in set.band.clone() {
             change += (other.response[k] - first.response[k]).norm_sqr() * first.applied_power[k];
             all += first.response[k].norm_sqr() * first.applied_power[k];
         }
@@ -212,10 +210,10 @@ pub(crate) const RATIO: &str = "measured per applied";
 
 /// Magnitude with its bounds, phase and coherence, the model, and the error over the number of modes if that was
 /// chosen.
-fn draw(result: &mut Identification, set: &Set, lines: &Lines, fitted: &Modal) {
+fn draw(result: &mut Identification, set: &Set, fitted: &Modal) {
     let h1 = set.powers.response(Estimator::H1);
-    let hz: Vec<f64> = lines.clone().map(|k| k as f64 * set.step_hz).collect();
-    let part = &h1.response[lines.clone()];
+    let hz: Vec<f64> = set.band.clone().map(|k| k as f64 * set.step_hz).collect();
+    let part = &h1.response[set.band.clone()];
     let sizes = |values: &[Complex64]| values.iter().map(|c| c.norm()).collect::<Vec<f64>>();
     let both = vec![
         Series::line("H1", &hz, &sizes(part)),
@@ -224,8 +222,12 @@ fn draw(result: &mut Identification, set: &Set, lines: &Lines, fitted: &Modal) {
     let frequency = "frequency, Hz";
     let mut magnitude = Chart::new("Response", frequency, RATIO, both);
     magnitude.y_log = true;
-    magnitude.band = bounds(&h1, lines, set.step_hz);
-    let coherence = vec![Series::line("coherence", &hz, &h1.coherence[lines.clone()])];
+    magnitude.band = bounds(&h1, set);
+    let coherence = vec![Series::line(
+        "coherence",
+        &hz,
+        &h1.coherence[set.band.clone()],
+    )];
     result.charts.extend([
         magnitude,
         phase(&hz, part, &fitted.response),
@@ -264,13 +266,13 @@ fn phase(hz: &[f64], h1: &[Complex64], model: &[Complex64]) -> Chart {
 }
 
 /// The magnitude ± twice its standard uncertainty: x, low, high.
-fn bounds(h1: &Frf, lines: &Lines, step_hz: f64) -> Vec<(f64, f64, f64)> {
+fn bounds(h1: &Frf, set: &Set) -> Vec<(f64, f64, f64)> {
     let one = |k: usize| {
         let (middle, std) = (h1.response[k].norm(), 2.0 * h1.relative_std(k)?);
-        let place = k as f64 * step_hz;
+        let place = k as f64 * set.step_hz;
         (std < 1.0).then_some((place, middle * (1.0 - std), middle * (1.0 + std)))
     };
-    lines.clone().filter_map(one).collect()
+    set.band.clone().filter_map(one).collect()
 }
 
 /// Unwrapped phase in degrees.

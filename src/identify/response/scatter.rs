@@ -36,7 +36,6 @@ use torqcomp_model::Covariance;
 use super::blocks::Set;
 use super::inverse::invert;
 use super::line_noise;
-use super::lines::Lines;
 use super::{Data, Modal};
 use crate::failure::Failure;
 
@@ -58,16 +57,11 @@ const TOP: usize = 10;
 ///
 /// # Errors
 /// If the derivatives cannot be computed.
-pub(super) fn of_poles(
-    set: &Set,
-    lines: &Lines,
-    whole: &Data,
-    fitted: &Modal,
-) -> Result<Covariance, Failure> {
+pub(super) fn of_poles(set: &Set, whole: &Data, fitted: &Modal) -> Result<Covariance, Failure> {
     let residue = if fitted.poles.len() == 1 { 2 } else { 0 };
     Ok(match Linearised::of(whole, fitted, residue)? {
         Some(fit) => {
-            let matrix = covariance(set, lines, whole, fitted, &fit);
+            let matrix = covariance(set, whole, fitted, &fit);
             fit.covariance_of(fit.searched + 2, matrix)
         }
         None => Covariance::independent(&vec![None; 2 * fitted.poles.len() + 3]),
@@ -80,31 +74,23 @@ pub(super) fn of_poles(
 /// If the derivatives cannot be computed.
 pub(super) fn of_all(
     set: &Set,
-    lines: &Lines,
     whole: &Data,
     fitted: &Modal,
 ) -> Result<Option<Covariance>, Failure> {
     let linear = fitted.linear().len();
     Ok(Linearised::of(whole, fitted, linear)?.map(|fit| {
-        let matrix = covariance(set, lines, whole, fitted, &fit);
+        let matrix = covariance(set, whole, fitted, &fit);
         fit.covariance_of(fit.searched + linear, matrix)
     }))
 }
 
-fn covariance(
-    set: &Set,
-    lines: &Lines,
-    whole: &Data,
-    fitted: &Modal,
-    solved: &Linearised,
-) -> DMatrix<f64> {
-    let noise = from_noise(set, lines, whole, fitted, solved)
-        + from_force(set, lines, whole, fitted, solved);
+fn covariance(set: &Set, whole: &Data, fitted: &Modal, solved: &Linearised) -> DMatrix<f64> {
+    let noise = from_noise(set, whole, fitted, solved) + from_force(set, whole, fitted, solved);
     let blocks = set.blocks.len();
     if blocks < FEW {
         return noise;
     }
-    let scattered = from_blocks(set, lines, whole, solved);
+    let scattered = from_blocks(set, whole, solved);
     if blocks >= MANY {
         return scattered;
     }
@@ -175,22 +161,22 @@ impl Linearised {
 }
 
 /// Power of the applied signal at each line, summed over blocks.
-pub(super) fn applied_power(set: &Set, lines: &Lines) -> Vec<f64> {
+pub(super) fn applied_power(set: &Set) -> Vec<f64> {
     let power = |k: usize| set.blocks.iter().map(|b| b.applied[k].norm_sqr()).sum();
-    lines.clone().map(power).collect()
+    set.band.clone().map(power).collect()
 }
 
 /// Estimate from the contribution of each block.
-fn from_blocks(set: &Set, lines: &Lines, data: &Data, solved: &Linearised) -> DMatrix<f64> {
-    let (count, columns) = (lines.len(), solved.free.len());
+fn from_blocks(set: &Set, data: &Data, solved: &Linearised) -> DMatrix<f64> {
+    let (count, columns) = (set.band.len(), solved.free.len());
     let h1 = &data.response;
-    let power = applied_power(set, lines);
+    let power = applied_power(set);
     let scores = DMatrix::from_fn(set.blocks.len(), columns, |b, p| {
         let block = &set.blocks[b];
         (0..count)
             .filter(|k| power[*k] > 0.0)
             .map(|k| {
-                let at = lines.start + k;
+                let at = set.band.start + k;
                 let (x, y) = (block.applied[at], block.measured[at]);
                 let error = x.conj() * (y - h1[k] * x) * (data.weight[k] / power[k]);
                 (solved.slope(k, p).conj() * error).re
@@ -216,19 +202,13 @@ fn from_blocks(set: &Set, lines: &Lines, data: &Data, solved: &Linearised) -> DM
 /// ```text
 /// (JᵀJ)⁻¹ Σ_b σ_b² Σ_i u_bi u_biᵀ (JᵀJ)⁻¹,   u_bi = −Re Σ_k J̄_k w_k X̄_kb H_k w_i e^{−jω_k t_i}/S_k
 /// ```
-fn from_force(
-    set: &Set,
-    lines: &Lines,
-    data: &Data,
-    fitted: &Modal,
-    solved: &Linearised,
-) -> DMatrix<f64> {
+fn from_force(set: &Set, data: &Data, fitted: &Modal, solved: &Linearised) -> DMatrix<f64> {
     let columns = solved.free.len();
     let mut sum = DMatrix::zeros(columns, columns);
-    let power = applied_power(set, lines);
+    let power = applied_power(set);
     let length = 2 * (set.lines - 1);
     for (b, stroke) in &set.strokes {
-        let applied = &set.blocks[*b].applied[lines.clone()];
+        let applied = &set.blocks[*b].applied[set.band.clone()];
         let weighted = |k: usize| match power[k] > 0.0 {
             true => applied[k].conj() * fitted.response[k] * (data.weight[k] / power[k]),
             false => Complex64::ZERO,
@@ -237,7 +217,7 @@ fn from_force(
         let scores = DMatrix::from_fn(stroke.samples.len(), columns, |row, p| {
             let i = stroke.samples.start + row;
             let at = |k: usize| Complex64::cis(-TAU * (k * i) as f64 / length as f64);
-            let (mut turn, step) = (at(lines.start), at(1));
+            let (mut turn, step) = (at(set.band.start), at(1));
             let mut score = 0.0;
             for (k, error) in weighted.iter().enumerate() {
                 score += (solved.slope(k, p).conj() * error * turn).re;
@@ -251,13 +231,7 @@ fn from_force(
 }
 
 /// Estimate from the power of the errors and the window.
-fn from_noise(
-    set: &Set,
-    lines: &Lines,
-    data: &Data,
-    fitted: &Modal,
-    solved: &Linearised,
-) -> DMatrix<f64> {
+fn from_noise(set: &Set, data: &Data, fitted: &Modal, solved: &Linearised) -> DMatrix<f64> {
     let squares = fitted.fit.as_ref().map_or(0.0, |f| f.sum_of_squares);
     let top = data.weight.iter().copied().fold(0.0, f64::max);
     let counted = data.weight.iter().filter(|w| **w > SILENT * top).count();
@@ -267,33 +241,22 @@ fn from_noise(
     let freedom = (2 * counted).saturating_sub(searched + linear).max(1);
     let power = 2.0 * squares / freedom as f64;
     let sizes = match set.blocks.len() {
-        0 | 1 => sizes_of_one(set, lines, data, &fitted.response, power),
-        _ => line_noise::sizes(
-            (set, lines),
-            &data.weight,
-            &fitted.response,
-            (power, counted),
-        ),
+        0 | 1 => sizes_of_one(set, data, &fitted.response, power),
+        _ => line_noise::sizes(set, &data.weight, &fitted.response, (power, counted)),
     };
-    let middle = gathered(set, lines, solved, &sizes) * 0.5;
+    let middle = gathered(set, solved, &sizes) * 0.5;
     &solved.inverse * middle * &solved.inverse
 }
 
 /// s_k of each line for one block; `power` is the mean power of the residuals over the lines that
 /// count.
-fn sizes_of_one(
-    set: &Set,
-    lines: &Lines,
-    data: &Data,
-    response: &[Complex64],
-    power: f64,
-) -> Vec<f64> {
-    let unseen = power_of_force_error(set, lines, data, response);
+fn sizes_of_one(set: &Set, data: &Data, response: &[Complex64], power: f64) -> Vec<f64> {
+    let unseen = power_of_force_error(set, data, response);
     unseen.into_iter().map(|u| (power + u).sqrt()).collect()
 }
 
 /// Power of the weighted errors due to the error of the applied signal in one block, by line.
-fn power_of_force_error(set: &Set, lines: &Lines, data: &Data, response: &[Complex64]) -> Vec<f64> {
+fn power_of_force_error(set: &Set, data: &Data, response: &[Complex64]) -> Vec<f64> {
     let applied = set.blocks.first().map_or(&[][..], |block| &block.applied);
     let top = &applied[applied.len() - applied.len() / TOP..];
     let unseen = top.iter().map(Complex64::norm_sqr).sum::<f64>() / top.len().max(1) as f64;
@@ -303,19 +266,19 @@ fn power_of_force_error(set: &Set, lines: &Lines, data: &Data, response: &[Compl
         }
         _ => 0.0,
     };
-    lines.clone().enumerate().map(size).collect()
+    set.band.clone().enumerate().map(size).collect()
 }
 
 /// Whether the error of the force dominates the uncertainty of a fit to one block.
-pub(super) fn is_of_force(set: &Set, lines: &Lines, data: &Data, fitted: &Modal) -> bool {
+pub(super) fn is_of_force(set: &Set, data: &Data, fitted: &Modal) -> bool {
     let squares = fitted.fit.as_ref().map_or(0.0, |f| f.sum_of_squares);
-    let of_force = power_of_force_error(set, lines, data, &fitted.response);
+    let of_force = power_of_force_error(set, data, &fitted.response);
     set.blocks.len() == 1 && of_force.iter().sum::<f64>() > squares
 }
 
 /// Re(J̄ᵀ Γ J).
-fn gathered(set: &Set, lines: &Lines, solved: &Linearised, sizes: &[f64]) -> DMatrix<f64> {
-    let (count, columns) = (lines.len(), solved.free.len());
+fn gathered(set: &Set, solved: &Linearised, sizes: &[f64]) -> DMatrix<f64> {
+    let (count, columns) = (set.band.len(), solved.free.len());
     let slope = |k: usize, p: usize| solved.slope(k, p);
     let length = 2 * (set.lines - 1);
     let reach = match set.window {
@@ -323,13 +286,13 @@ fn gathered(set: &Set, lines: &Lines, solved: &Linearised, sizes: &[f64]) -> DMa
         Window::Hann => 2,
         Window::Exponential(_) => REACH.min(count - 1),
     };
-    let power = applied_power(set, lines);
+    let power = applied_power(set);
     let mut sum = DMatrix::zeros(columns, columns);
     for lag in 0..=reach {
         // E[z_k z̄_l] for l = k + lag; the other side is its conjugate.
         let window = line_correlation(set.window, lag, length).conj();
         for k in 0..count - lag {
-            let (at, l) = (lines.start + k, k + lag);
+            let (at, l) = (set.band.start + k, k + lag);
             let size = (power[k] * power[l]).sqrt();
             if size == 0.0 {
                 continue;

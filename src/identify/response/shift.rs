@@ -6,7 +6,6 @@ use torqcomp_dsp::frf::Window;
 
 use super::blocks::Set;
 use super::foreign;
-use super::lines::Lines;
 use super::order::{best_of_whole, grow};
 use super::whole::Whole;
 use super::{Data, Effort, FinalFit, Lag, Modal, ResponseOptions, scatter};
@@ -41,7 +40,7 @@ const SIGNIFICANT: f64 = 3.0;
 /// # Errors
 /// If there are too few lines.
 pub(super) fn of(
-    (set, lines): (&Set, &Lines),
+    set: &Set,
     options: &ResponseOptions,
     (data, coarse): (&Data, &Modal),
 ) -> Result<Option<Modal>, Failure> {
@@ -54,11 +53,11 @@ pub(super) fn of(
         ..data.clone()
     };
     let has_stand_in = foreign::has_out_of_band(coarse);
-    let least = set.error(&coarse.response, lines);
-    let numbers = 2.0 * lines.len() as f64;
+    let least = set.error(&coarse.response);
+    let numbers = 2.0 * set.band.len() as f64;
     for late in with_fewer_modes(&data, coarse.poles.len(), options) {
         let late = late?;
-        let std_s = scatter::of_poles(set, lines, &data, &late)?.std(2 * late.poles.len());
+        let std_s = scatter::of_poles(set, &data, &late)?.std(2 * late.poles.len());
         let is_known = std_s.is_some_and(|std_s| late.delay_s.abs() > SIGNIFICANT * std_s);
         // Three parameters with a normal mode, and the delay.
         let fewer = 4 * coarse.poles.len() - 3 * late.poles.len() - 1;
@@ -66,7 +65,7 @@ pub(super) fn of(
             true => AS_FEW,
             false => (0.5 * fewer as f64 * numbers.ln() / numbers).exp(),
         };
-        if (is_known || has_stand_in) && set.error(&late.response, lines) <= slack * least {
+        if (is_known || has_stand_in) && set.error(&late.response) <= slack * least {
             return Ok(Some(late));
         }
     }
@@ -281,15 +280,11 @@ pub(super) fn filtered_whole(
 ///
 /// # Errors
 /// If there are too few lines.
-pub(super) fn filtered(
-    (set, lines): (&Set, &Lines),
-    data: &Data,
-    coarse: &Modal,
-) -> Result<(Data, Modal), Failure> {
+pub(super) fn filtered(set: &Set, data: &Data, coarse: &Modal) -> Result<(Data, Modal), Failure> {
     let fitted = data.fit(&coarse.poles, coarse.delay_s, Effort::Fine)?;
     if let Some(data) = with_low_pass(data, &fitted) {
         let found = data.fit(&fitted.poles, fitted.delay_s, Effort::Fine)?;
-        let error = |modal: &Modal| set.error(&modal.response, lines);
+        let error = |modal: &Modal| set.error(&modal.response);
         if found.delay_s > 0.0 && error(&found) < CLEARLY_LESS * error(&fitted) {
             return Ok((data, found));
         }
