@@ -347,11 +347,23 @@ fn every_warning_is_listed_and_every_code_is_used() {
         .flat_map(|(_, codes)| codes.iter())
         .map(|c| c[0])
         .collect();
+    let variant = |code: &str| -> String {
+        let words = code.split('-');
+        words
+            .map(|word| word[..1].to_uppercase() + &word[1..])
+            .collect()
+    };
     for code in &codes {
-        assert!(all.contains(&format!("\"{code}\"")), "{code} is not used");
+        let names = [
+            format!("\"{code}\""),
+            format!("WarningCode::{}", variant(code)),
+        ];
+        assert!(
+            names.iter().any(|name| all.contains(name)),
+            "{code} is not used"
+        );
     }
-    let calls = ["Warning::new(", ".warn("];
-    for call in calls.iter().flat_map(|call| all.split(call).skip(1)) {
+    for call in all.split("Warning::new(").skip(1) {
         let Some(literal) = call.trim_start().strip_prefix('"') else {
             continue;
         };

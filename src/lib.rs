@@ -25,7 +25,7 @@ pub mod recording;
 mod stand;
 mod student;
 mod unit;
-mod warning;
+pub mod warning;
 
 use std::process::ExitCode;
 

@@ -35,7 +35,7 @@ use crate::recording::moment::Moment;
 use crate::recording::{ChannelStream, Spool, UniformRecord};
 use crate::stand::{self, Calibration, ConstantStd, Stand, TorqueStd, off_rated};
 use crate::unit::NamedUnit;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Distance of the record from time zero, in its own lengths, up to which phases refer to zero.
 const FAR_FROM_ZERO: f64 = 10.0;
@@ -366,17 +366,14 @@ fn visible_orders(
         )));
     }
     if let (Some(first), Some(last)) = (unseen.first(), unseen.last()) {
-        warnings.push(Warning::new(
-            "orders-above-nyquist",
-            format!(
-                "omitted, as above half the sampling rate of {} Hz: {}",
-                short(rate_hz),
-                match first == last {
-                    true => format!("order {}", short(*first)),
-                    false => format!("orders {} to {}", short(*first), short(*last)),
-                }
-            ),
-        ));
+        warnings.push(WarningCode::OrdersAboveNyquist.warning(format!(
+            "omitted, as above half the sampling rate of {} Hz: {}",
+            short(rate_hz),
+            match first == last {
+                true => format!("order {}", short(*first)),
+                false => format!("orders {} to {}", short(*first), short(*last)),
+            }
+        )));
     }
     Ok(seen)
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::file_name::{ShowPath, is_dash};
 use crate::io::storage::Stored;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Number of bytes compared at a time.
 const PIECE: usize = 1 << 16;
@@ -29,14 +29,11 @@ pub fn files(names: &[PathBuf]) -> (Vec<Warning>, Vec<usize>) {
         .map(|group| {
             let others = group[1..].iter().map(|i| names[*i].shown().to_string());
             let others: Vec<String> = others.collect();
-            Warning::new(
-                "identical-files",
-                format!(
-                    "{} and {} are identical, byte for byte: one record under several names",
-                    names[group[0]].shown(),
-                    others.join(", ")
-                ),
-            )
+            WarningCode::IdenticalFiles.warning(format!(
+                "{} and {} are identical, byte for byte: one record under several names",
+                names[group[0]].shown(),
+                others.join(", ")
+            ))
         })
         .collect();
     (warnings, groups.iter().map(|group| group[0]).collect())

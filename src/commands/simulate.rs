@@ -17,7 +17,7 @@ use crate::recording::moment::Moment;
 use crate::recording::{Channel, ChannelStream, UniformStream};
 use crate::stand::{self, Calibration, Stand, TransducerSignal};
 use crate::unit::{NamedUnit, RecordedChannel};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// The simulated response of a stand to a recorded input.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -349,14 +349,11 @@ fn applied_unit(
             &format!("this stand takes {expected}; give the right unit with --unit"),
         )),
         (None, None) => {
-            warnings.push(Warning::new(
-                "unit-assumed",
-                format!(
-                    "the channel \"{}\" has no unit: {expected}, which the stand expects, was assumed; give another \
-                     with --unit",
-                    chosen.name
-                ),
-            ));
+            warnings.push(WarningCode::UnitAssumed.warning(format!(
+                "the channel \"{}\" has no unit: {expected}, which the stand expects, was assumed; give another \
+                 with --unit",
+                chosen.name
+            )));
             Ok(wanted)
         }
     }

@@ -7,6 +7,7 @@ use torqcomp_dsp::quality::mains::mains;
 
 use super::Identification;
 use crate::print::rounded;
+use crate::warning::WarningCode;
 
 /// A steady line in addition to the decay.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,22 +107,23 @@ pub(super) fn taken_off(result: &mut Identification, lines: &[SteadyLine]) {
     let (of_mains, others): (Vec<SteadyLine>, Vec<SteadyLine>) =
         lines.iter().partition(|line| line.is_of_mains);
     for (code, what, lines) in [
-        ("mains-taken-off", "steady lines of the mains", of_mains),
         (
-            "tone-taken-off",
+            WarningCode::MainsTakenOff,
+            "steady lines of the mains",
+            of_mains,
+        ),
+        (
+            WarningCode::ToneTakenOff,
             "steady lines, as from a running fan or motor,",
             others,
         ),
     ] {
         if !lines.is_empty() {
-            result.warn(
-                code,
-                format!(
-                    "{what} were fitted and removed: {}; if one of them is the stand's own, record for longer, until \
-                     it has decayed",
-                    listed(&lines)
-                ),
-            );
+            result.warn(code.warning(format!(
+                "{what} were fitted and removed: {}; if one of them is the stand's own, record for longer, until \
+                 it has decayed",
+                listed(&lines)
+            )));
         }
     }
 }

@@ -261,8 +261,8 @@ impl Identification {
     }
 
     /// Adds a warning.
-    pub(crate) fn warn(&mut self, code: &'static str, message: impl Into<String>) {
-        self.warnings.push(Warning::new(code, message));
+    pub(crate) fn warn(&mut self, warning: Warning) {
+        self.warnings.push(warning);
     }
 
     /// Adds constants and their strong correlations.

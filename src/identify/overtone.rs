@@ -2,6 +2,7 @@
 
 use super::{Identification, Pole};
 use crate::print::rounded;
+use crate::warning::WarningCode;
 
 /// Orders of distortion, and largest relative difference of frequency and decay rate from that multiple of the mode's.
 const ORDERS: [f64; 2] = [2.0, 3.0];
@@ -30,15 +31,12 @@ pub(super) fn warn(
         let Some(order) = ORDERS.iter().find(|order| is_power(&pole, order)) else {
             continue;
         };
-        result.warn(
-            "overtone",
-            format!(
-                "the mode at {} Hz has {order} times the frequency and about {order} times the decay rate of that at \
-                 {} Hz: it is probably no mode, but distortion by an amplifier near its limit or a spring that is not \
-                 linear, which makes the other constants wrong as well; {advice}",
-                rounded(pole.frequency_hz(), 5),
-                rounded(of.frequency_hz(), 5)
-            ),
-        );
+        result.warn(WarningCode::Overtone.warning(format!(
+            "the mode at {} Hz has {order} times the frequency and about {order} times the decay rate of that at \
+             {} Hz: it is probably no mode, but distortion by an amplifier near its limit or a spring that is not \
+             linear, which makes the other constants wrong as well; {advice}",
+            rounded(pole.frequency_hz(), 5),
+            rounded(of.frequency_hz(), 5)
+        )));
     }
 }

@@ -5,7 +5,7 @@ use torqcomp_dsp::quality::copies::{Portrait, Relation, relation};
 use super::{labels, unit_of, with_unit};
 use crate::print::rounded;
 use crate::recording::{Channel, Recording};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// A channel to be compared.
 struct Seen<'a> {
@@ -62,7 +62,7 @@ impl Family<'_> {
                 "{} {hold} the same samples as \"{first}\": the same signal stored several times",
                 quoted.join(", ")
             );
-            found.push((Warning::new("channel-copy", message), names(&same)));
+            found.push((WarningCode::ChannelCopy.warning(message), names(&same)));
         }
         if !scaled.is_empty() {
             let equations = scaled.iter().map(|(seen, relation)| {
@@ -73,7 +73,10 @@ impl Family<'_> {
                 "to within the rounding of both, {}: the same signal on different scales",
                 equations.collect::<Vec<_>>().join("; ")
             );
-            found.push((Warning::new("channel-multiple", message), names(&scaled)));
+            found.push((
+                WarningCode::ChannelMultiple.warning(message),
+                names(&scaled),
+            ));
         }
         found
     }
@@ -107,14 +110,17 @@ pub fn across(recordings: &[&Recording]) -> Vec<Warning> {
                 let (name, other) = (&a.label, &b.label);
                 let (file, second) = (&recordings[i].source, &recordings[j].source);
                 let (code, what) = if relation.identical {
-                    ("channel-copy", format!("the same samples as \"{name}\""))
+                    (
+                        WarningCode::ChannelCopy,
+                        format!("the same samples as \"{name}\""),
+                    )
                 } else {
-                    ("channel-multiple", follows(name, b.channel, &relation))
+                    (
+                        WarningCode::ChannelMultiple,
+                        follows(name, b.channel, &relation),
+                    )
                 };
-                found.push(Warning::new(
-                    code,
-                    format!("\"{other}\" of {second} is {what} of {file}"),
-                ));
+                found.push(code.warning(format!("\"{other}\" of {second} is {what} of {file}")));
             }
         }
     }

@@ -17,7 +17,7 @@ use torqcomp_dsp::quality::repeats::repeats;
 use torqcomp_dsp::quality::spikes::{Spikes, spikes};
 
 use crate::recording::{AlignedChannels, Channel, TimeAxis};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 pub use samples::{Findings, clipped_ends, interpolated_by, repeats_of};
 pub use time::TimeFindings;
@@ -112,10 +112,10 @@ pub fn constant(channels: &[(&str, f64)]) -> Warning {
     let named = channels
         .iter()
         .map(|(name, value)| format!("\"{name}\" is always {}", crate::print::short(*value)));
-    Warning::new(
-        "constant-channel",
-        format!("{}: not connected, not selected, or no signal", join(named)),
-    )
+    WarningCode::ConstantChannel.warning(format!(
+        "{}: not connected, not selected, or no signal",
+        join(named)
+    ))
 }
 
 /// Warning about coarsely resolved channels.
@@ -128,13 +128,10 @@ pub fn coarse(channels: &[(&str, &str, Quantisation)]) -> Warning {
             crate::print::rounded(q.bits, 2)
         )
     });
-    Warning::new(
-        "coarse-quantisation",
-        format!(
-            "{}: rounding alone adds noise of 0.29 steps rms; use a smaller input range",
-            join(named)
-        ),
-    )
+    WarningCode::CoarseQuantisation.warning(format!(
+        "{}: rounding alone adds noise of 0.29 steps rms; use a smaller input range",
+        join(named)
+    ))
 }
 
 /// `a; b; c`, truncated if there are very many.

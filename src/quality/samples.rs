@@ -15,7 +15,7 @@ use torqcomp_dsp::quality::{Run, is_straight, range};
 use super::{place, with_unit};
 use crate::print::{plural, rounded, short};
 use crate::recording::{Hole, HoleKind, TimeAxis};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Number of levels below which a resolution is coarse: 8 bits.
 const COARSE: f64 = 256.0;
@@ -190,16 +190,13 @@ fn non_finite_cells(name: &str, found: &NonFinite, axis: &TimeAxis, holes: &[Hol
         Some(hole) if hole.line > 0 => format!(", line {}", hole.line),
         _ => String::new(),
     };
-    Warning::new(
-        "non-finite",
-        format!(
-            "\"{name}\": {} without a finite number{counts}, the first at {}{line}, at most {} in a row; \
-             remove or repair them before processing",
-            plural(found.count, "sample"),
-            place(axis, found.first),
-            found.longest
-        ),
-    )
+    WarningCode::NonFinite.warning(format!(
+        "\"{name}\": {} without a finite number{counts}, the first at {}{line}, at most {} in a row; \
+         remove or repair them before processing",
+        plural(found.count, "sample"),
+        place(axis, found.first),
+        found.longest
+    ))
 }
 
 /// Warnings about clipping of a channel.
@@ -218,33 +215,27 @@ fn clipped(name: &str, unit: &str, end: &str, rail: &Rail, axis: &TimeAxis) -> W
             format!("within {} there", with_unit(rail.spread, unit, 2)),
         ),
     };
-    Warning::new(
-        "clipped",
-        format!(
-            "\"{name}\" is clipped at its {end} {level} of {}: {samples} are {there}, in {} of up to {} samples that \
-             the signal enters or leaves at full slope, the first at {}; use a larger input range, unless the signal \
-             itself is limited there",
-            with_unit(rail.value, unit, 6),
-            plural(rail.runs, "run"),
-            rail.longest,
-            place(axis, rail.first)
-        ),
-    )
+    WarningCode::Clipped.warning(format!(
+        "\"{name}\" is clipped at its {end} {level} of {}: {samples} are {there}, in {} of up to {} samples that \
+         the signal enters or leaves at full slope, the first at {}; use a larger input range, unless the signal \
+         itself is limited there",
+        with_unit(rail.value, unit, 6),
+        plural(rail.runs, "run"),
+        rail.longest,
+        place(axis, rail.first)
+    ))
 }
 
 fn stuck(name: &str, unit: &str, found: &Standstills, axis: &TimeAxis) -> Warning {
     let (samples, longest) = (found.samples, found.longest);
-    Warning::new(
-        "stuck-channel",
-        format!(
-            "\"{name}\" is constant in {}, {samples} samples in all; the longest is {} samples at {}, starting at {}: \
-             at rest, or a drop-out of a cable, a transmitter or the recorder",
-            plural(found.count, "stretch"),
-            longest.length,
-            with_unit(longest.value, unit, 6),
-            place(axis, longest.start)
-        ),
-    )
+    WarningCode::StuckChannel.warning(format!(
+        "\"{name}\" is constant in {}, {samples} samples in all; the longest is {} samples at {}, starting at {}: \
+         at rest, or a drop-out of a cable, a transmitter or the recorder",
+        plural(found.count, "stretch"),
+        longest.length,
+        with_unit(longest.value, unit, 6),
+        place(axis, longest.start)
+    ))
 }
 
 pub(super) fn spiked(name: &str, unit: &str, found: &Spikes, axis: &TimeAxis) -> Warning {
@@ -253,27 +244,21 @@ pub(super) fn spiked(name: &str, unit: &str, found: &Spikes, axis: &TimeAxis) ->
         1 => ("one isolated sample".to_owned(), ""),
         count => (format!("isolated samples in {count} places"), ", the first"),
     };
-    Warning::new(
-        "spikes",
-        format!(
-            "\"{name}\": {places}, far from the neighbours{is_first} at {}: {} after {}; a mark for a missing value, a \
-             drop-out or a glitch, unless the signal has such pulses; repair them, or exclude that part",
-            place(axis, first.index),
-            with_unit(first.value, unit, 6),
-            with_unit(first.before, unit, 6)
-        ),
-    )
+    WarningCode::Spikes.warning(format!(
+        "\"{name}\": {places}, far from the neighbours{is_first} at {}: {} after {}; a mark for a missing value, a \
+         drop-out or a glitch, unless the signal has such pulses; repair them, or exclude that part",
+        place(axis, first.index),
+        with_unit(first.value, unit, 6),
+        with_unit(first.before, unit, 6)
+    ))
 }
 
 fn two_signals(name: &str, unit: &str, difference: f64) -> Warning {
-    Warning::new(
-        "two-signals",
-        format!(
-            "\"{name}\": every other sample belongs to another signal, {} apart on average: two sources are mixed, as two \
-             nodes that publish on one topic; record each under a name of its own",
-            with_unit(difference.abs(), unit, 3)
-        ),
-    )
+    WarningCode::TwoSignals.warning(format!(
+        "\"{name}\": every other sample belongs to another signal, {} apart on average: two sources are mixed, as two \
+         nodes that publish on one topic; record each under a name of its own",
+        with_unit(difference.abs(), unit, 3)
+    ))
 }
 
 /// Warning about a record that was interpolated to a higher rate.
@@ -287,16 +272,13 @@ pub fn interpolated_by(name: &str, found: &Interpolated, axis: &TimeAxis) -> War
             short(0.5 * recorded_hz)
         )
     });
-    Warning::new(
-        "interpolated-samples",
-        format!(
-            "\"{name}\": the samples lie on straight lines between every {} of them: the record was interpolated{rates}; \
-             use it as it was recorded, or keep one row in {}, beginning with row {}",
-            ordinal(found.every),
-            found.every,
-            found.first + 1
-        ),
-    )
+    WarningCode::InterpolatedSamples.warning(format!(
+        "\"{name}\": the samples lie on straight lines between every {} of them: the record was interpolated{rates}; \
+         use it as it was recorded, or keep one row in {}, beginning with row {}",
+        ordinal(found.every),
+        found.every,
+        found.first + 1
+    ))
 }
 
 /// `2nd`, `3rd`, `4th`.
@@ -336,10 +318,9 @@ fn repeated(name: &str, found: &Repeats, axis: &TimeAxis) -> Warning {
         Some(hold) => format!("every value is held for {hold} samples"),
         None => "more than its resolution explains".to_owned(),
     };
-    Warning::new(
-        "repeated-samples",
-        format!("\"{name}\": {percent} % of the samples repeat the previous one, {how}{rate}"),
-    )
+    WarningCode::RepeatedSamples.warning(format!(
+        "\"{name}\": {percent} % of the samples repeat the previous one, {how}{rate}"
+    ))
 }
 
 fn hum(name: &str, unit: &str, found: &Mains) -> Warning {
@@ -354,14 +335,11 @@ fn hum(name: &str, unit: &str, found: &Mains) -> Warning {
             )
         })
         .collect();
-    Warning::new(
-        "mains-lines",
-        format!(
-            "\"{name}\" has lines at multiples of {} Hz, as from mains hum: {} (peak; lines closer than {} Hz are not \
-             resolved); a machine running in step with the mains causes such lines as well",
-            short(found.nominal_hz),
-            lines.join(", "),
-            rounded(found.resolution_hz, 2)
-        ),
-    )
+    WarningCode::MainsLines.warning(format!(
+        "\"{name}\" has lines at multiples of {} Hz, as from mains hum: {} (peak; lines closer than {} Hz are not \
+         resolved); a machine running in step with the mains causes such lines as well",
+        short(found.nominal_hz),
+        lines.join(", "),
+        rounded(found.resolution_hz, 2)
+    ))
 }

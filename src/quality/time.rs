@@ -12,7 +12,7 @@ use crate::recording::{
     ArrivalBlocks, COARSE_STAMPS, Channel, FEWEST_UNLIKE, REVERSED, TimeAxis, advice_for_uneven,
     contradicted, falls, no_stamps, rates_of, rolled_over, same_stamps,
 };
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Largest relative deviation of a step in an axis that counts as uniform.
 const UNIFORM: f64 = 0.01;
@@ -71,24 +71,21 @@ impl TimeFindings {
     pub fn warnings(&self, whose: &str, axis: &TimeAxis) -> Vec<Warning> {
         let mut found: Vec<Warning> = missing(whose, axis).into_iter().collect();
         if let Some(assumed) = &axis.assumed {
-            found.push(Warning::new("time-assumed", format!("{whose}: {assumed}")));
+            found.push(WarningCode::TimeAssumed.warning(format!("{whose}: {assumed}")));
         }
         found.extend(self.contradiction.map(|c| contradicted(whose, &c)));
         let Some(steps) = &self.steps else {
             return found;
         };
         if steps.non_finite > 0 {
-            found.push(Warning::new(
-                "non-finite-stamps",
-                format!(
-                    "{whose}: {} without a number",
-                    plural(steps.non_finite, "time stamp")
-                ),
-            ));
+            found.push(WarningCode::NonFiniteStamps.warning(format!(
+                "{whose}: {} without a number",
+                plural(steps.non_finite, "time stamp")
+            )));
         }
         if let Some(blocks) = &self.blocks {
             let said = format!("{whose}: {}", blocks.explain(1.0));
-            found.push(Warning::new("time-jitter", said));
+            found.push(WarningCode::TimeJitter.warning(said));
             return found;
         }
         found.extend(backwards(whose, axis, steps));
@@ -118,15 +115,12 @@ pub fn stamps_in_channel(name: &str, channel: &Channel) -> Option<Warning> {
     }
     let step_s = steps(&channel.samples)?.typical_s * unit.unit.factor();
     let found = contradiction(stated_hz, 1.0 / step_s, channel.samples.len())?;
-    Some(Warning::new(
-        "rate-contradicts-stamps",
-        format!(
-            "\"{name}\" rises like a time axis of {} Hz, but the header gives {} Hz for it; find out which is right, \
-             and give it with --rate, or the column with --time-column",
-            number(found.stamped_hz, 6),
-            number(found.stated_hz, 6)
-        ),
-    ))
+    Some(WarningCode::RateContradictsStamps.warning(format!(
+        "\"{name}\" rises like a time axis of {} Hz, but the header gives {} Hz for it; find out which is right, \
+         and give it with --rate, or the column with --time-column",
+        number(found.stamped_hz, 6),
+        number(found.stated_hz, 6)
+    )))
 }
 
 fn missing(whose: &str, axis: &TimeAxis) -> Option<Warning> {
@@ -146,7 +140,7 @@ fn missing(whose: &str, axis: &TimeAxis) -> Option<Warning> {
         None => no_stamps(axis, given),
     };
     let message = format!("{whose}: the sampling rate is unknown, because {why}");
-    Some(Warning::new("missing-rate", message))
+    Some(WarningCode::MissingRate.warning(message))
 }
 
 /// `3 of …, the first at …`; `None` if there are none.
@@ -164,7 +158,7 @@ fn backwards(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
              --rate HZ to continue across it",
             axis.moment(first.from_s).short()
         );
-        return Some(Warning::new("time-backwards", message));
+        return Some(WarningCode::TimeBackwards.warning(message));
     }
     let why = if -longest.step_s > SET_BACK * steps.typical_s {
         "the clock was set back, two recordings were joined, or rows were written twice; split the file there, or \
@@ -172,72 +166,57 @@ fn backwards(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
     } else {
         "the samples are out of order"
     };
-    Some(Warning::new(
-        "time-backwards",
-        format!(
-            "{whose}: time runs backwards {}, first at {} and at most by {} s: {why}",
-            times(steps.backwards.count),
-            axis.moment(first.from_s).short(),
-            number(-longest.step_s, 4)
-        ),
-    ))
+    Some(WarningCode::TimeBackwards.warning(format!(
+        "{whose}: time runs backwards {}, first at {} and at most by {} s: {why}",
+        times(steps.backwards.count),
+        axis.moment(first.from_s).short(),
+        number(-longest.step_s, 4)
+    )))
 }
 
 fn repeated(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
     let (first, _) = counted(&steps.repeated)?;
-    Some(Warning::new(
-        "repeated-stamps",
-        format!(
-            "{whose}: {} the same as the previous one, first {}: samples stored twice, or a stopped clock",
-            plural(steps.repeated.count, "time stamp"),
-            axis.moment(first.from_s).short()
-        ),
-    ))
+    Some(WarningCode::RepeatedStamps.warning(format!(
+        "{whose}: {} the same as the previous one, first {}: samples stored twice, or a stopped clock",
+        plural(steps.repeated.count, "time stamp"),
+        axis.moment(first.from_s).short()
+    )))
 }
 
 fn jumps(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
     let (first, _) = counted(&steps.jumps)?;
-    Some(Warning::new(
-        "clock-jump",
-        format!(
-            "{whose}: the time stamps jump by {} s after {}, more than the rest of the record lasts: the clock was \
-             set, or two recordings were joined; split the file there",
-            number(first.step_s, 4),
-            axis.moment(first.from_s).short()
-        ),
-    ))
+    Some(WarningCode::ClockJump.warning(format!(
+        "{whose}: the time stamps jump by {} s after {}, more than the rest of the record lasts: the clock was \
+         set, or two recordings were joined; split the file there",
+        number(first.step_s, 4),
+        axis.moment(first.from_s).short()
+    )))
 }
 
 fn gaps(whose: &str, axis: &TimeAxis, steps: &Steps) -> Option<Warning> {
     let (first, longest) = counted(&steps.gaps)?;
     let samples = steps.stamps as f64;
-    Some(Warning::new(
-        "time-gaps",
-        format!(
-            "{whose}: {} in the time stamps, samples missing: about {} ({} %); the first after {}, the longest of {} s \
-             after {}; --fill linear fills short ones",
-            plural(steps.gaps.count, "gap"),
-            number(steps.missing, 6),
-            number(100.0 * steps.missing / (samples + steps.missing), 2),
-            axis.moment(first.from_s).short(),
-            number(longest.step_s, 4),
-            axis.moment(longest.from_s).short()
-        ),
-    ))
+    Some(WarningCode::TimeGaps.warning(format!(
+        "{whose}: {} in the time stamps, samples missing: about {} ({} %); the first after {}, the longest of {} s \
+         after {}; --fill linear fills short ones",
+        plural(steps.gaps.count, "gap"),
+        number(steps.missing, 6),
+        number(100.0 * steps.missing / (samples + steps.missing), 2),
+        axis.moment(first.from_s).short(),
+        number(longest.step_s, 4),
+        axis.moment(longest.from_s).short()
+    )))
 }
 
 fn jitter(whose: &str, steps: &Steps) -> Option<Warning> {
     let jitter = steps.jitter.filter(|jitter| jitter.peak > UNIFORM)?;
-    Some(Warning::new(
-        "time-jitter",
-        format!(
-            "{whose}: the time stamps jitter about a step of {} s by {} % rms, {} % at most; --resample interpolates \
-             to a uniform step; if the stamps are arrival times, give the recorder's rate with --rate HZ",
-            number(steps.typical_s, 6),
-            number(100.0 * jitter.std, 3),
-            number(100.0 * jitter.peak, 3)
-        ),
-    ))
+    Some(WarningCode::TimeJitter.warning(format!(
+        "{whose}: the time stamps jitter about a step of {} s by {} % rms, {} % at most; --resample interpolates \
+         to a uniform step; if the stamps are arrival times, give the recorder's rate with --rate HZ",
+        number(steps.typical_s, 6),
+        number(100.0 * jitter.std, 3),
+        number(100.0 * jitter.peak, 3)
+    )))
 }
 
 fn rounded_stamps(whose: &str, rounded: &Rounded, axis: &TimeAxis, has_gaps: bool) -> Warning {
@@ -253,16 +232,13 @@ fn rounded_stamps(whose: &str, rounded: &Rounded, axis: &TimeAxis, has_gaps: boo
     let allowed = ends.map_or_else(String::new, |span_s| {
         format!(" (they allow {})", rates_of(rounded.steps_over(span_s)))
     });
-    Warning::new(
-        "rounded-time-stamps",
-        format!(
-            "{whose}: the time stamps are written in multiples of {} s; apart from {but_for} they are uniform, and \
-             together they give {} Hz{allowed}{}",
-            number(rounded.quantum_s, 3),
-            number(1.0 / rounded.step_s, 9),
-            same_stamps(rounded.quantum_s / rounded.step_s, rounded.quantum_s)
-        ),
-    )
+    WarningCode::RoundedTimeStamps.warning(format!(
+        "{whose}: the time stamps are written in multiples of {} s; apart from {but_for} they are uniform, and \
+         together they give {} Hz{allowed}{}",
+        number(rounded.quantum_s, 3),
+        number(1.0 / rounded.step_s, 9),
+        same_stamps(rounded.quantum_s / rounded.step_s, rounded.quantum_s)
+    ))
 }
 
 fn times(count: usize) -> String {

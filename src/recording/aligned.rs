@@ -12,7 +12,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::io::{ChannelChoice, Input, Reading};
 use crate::print;
 use crate::unit::NamedUnit;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Largest difference of the stamps of two channels that count as equal, in steps.
 const SAME_STAMP: f64 = 0.05;
@@ -232,7 +232,7 @@ pub(crate) fn resampled(
             print::plural(done.repeated, "repeated stamp")
         );
     }
-    Warning::new("resampled", message)
+    WarningCode::Resampled.warning(message)
 }
 
 /// Keeps the worst problems of resampling.
@@ -346,7 +346,7 @@ fn differ(chosen: &[Selection]) -> Failure {
     let all: Vec<String> = chosen.iter().map(one).collect();
     ErrorCode::RecordsDiffer.failed(format_args!(
         "the channels do not lie on one time axis: {}; record them at one rate, or bring one to the rate \
-     of the other with torqcomp extract --resample --rate HZ first",
+         of the other with torqcomp extract --resample --rate HZ first",
         all.join(", ")
     ))
 }

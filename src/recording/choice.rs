@@ -17,7 +17,7 @@ use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading, already_compensated};
 use crate::print::{enumeration, list, plural, some_of};
 use crate::unit::{NamedUnit, RecordedChannel};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Identification of a channel.
 #[derive(Debug, Clone, Copy)]
@@ -187,13 +187,10 @@ pub(crate) fn unit_of(
     };
     let other = of_file.filter(|named| named.unit != given.unit && !answers(named));
     let warning = other.map(|named| {
-        Warning::new(
-            "unit-overrides-heading",
-            format!(
-                "\"{heading}\" says {}, {flag} says {text}; {text} was used",
-                named.text
-            ),
-        )
+        WarningCode::UnitOverridesHeading.warning(format!(
+            "\"{heading}\" says {}, {flag} says {text}; {text} was used",
+            named.text
+        ))
     });
     Ok((Some(given), warning))
 }
@@ -204,39 +201,30 @@ pub(crate) fn overridden(reading: &Reading, stamps_in: &str, stamps_s: &[f64]) -
     let given = digits::text(rate_hz, 7);
     let Some(stamped) = step_of(stamps_s, 0.0) else {
         let advice = advice_for_uneven(stamps_s)?;
-        return Some(Warning::new(
-            "rate-overrides-stamps",
-            format!(
-                "the stamps in \"{stamps_in}\" have no usual step, and --rate places the samples at equal steps of \
-                 {given} Hz, which gives other times and frequencies: {advice}"
-            ),
-        ));
+        return Some(WarningCode::RateOverridesStamps.warning(format!(
+            "the stamps in \"{stamps_in}\" have no usual step, and --rate places the samples at equal steps of \
+             {given} Hz, which gives other times and frequencies: {advice}"
+        )));
     };
     let stamped_hz = 1.0 / stamped.step;
     let uncertain = 3.0 * stamped.rate_std_hz(stamped_hz).unwrap_or(0.0) / stamped_hz;
     if (rate_hz / stamped_hz - 1.0).abs() <= uncertain.max(TOLERABLE) {
         return None;
     }
-    Some(Warning::new(
-        "rate-overrides-stamps",
-        format!(
-            "the stamps in \"{stamps_in}\" give {} Hz, --rate says {given} Hz; {given} Hz was used",
-            digits::text(stamped_hz, 7)
-        ),
-    ))
+    Some(WarningCode::RateOverridesStamps.warning(format!(
+        "the stamps in \"{stamps_in}\" give {} Hz, --rate says {given} Hz; {given} Hz was used",
+        digits::text(stamped_hz, 7)
+    )))
 }
 
 /// Warning about contradictory rates in the file header and its stamps; `whose` names the channels.
 pub(crate) fn contradicted(whose: &str, found: &Contradiction) -> Warning {
-    Warning::new(
-        "rate-contradicts-stamps",
-        format!(
-            "{whose}: the header gives {} Hz, the time stamps give {} Hz; find out which is right, and give it with \
-             --rate if it is not the stamps",
-            digits::text(found.stated_hz, 6),
-            digits::text(found.stamped_hz, 6)
-        ),
-    )
+    WarningCode::RateContradictsStamps.warning(format!(
+        "{whose}: the header gives {} Hz, the time stamps give {} Hz; find out which is right, and give it with \
+         --rate if it is not the stamps",
+        digits::text(found.stated_hz, 6),
+        digits::text(found.stamped_hz, 6)
+    ))
 }
 
 /// A selected channel, including the user's settings for it.

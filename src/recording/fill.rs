@@ -11,7 +11,7 @@ use super::{Hole, HoleKind, Recording};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::{Fill, Reading};
 use crate::print::{plural, some_of};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Number of intervals listed in a warning.
 const SAID: usize = 5;
@@ -175,13 +175,10 @@ fn said(
     let each = each.map(|span| format!("{} to {}", time(span.from_s), time(span.to_s)));
     let shown = some_of(each, spans.len(), SAID);
     (count > 0).then(|| {
-        Warning::new(
-            "filled",
-            format!(
-                "\"{name}\": {} at {} filled with {how}: {shown}; do not trust the result there",
-                plural(count, "missing sample"),
-                plural(spans.len(), "place"),
-            ),
-        )
+        WarningCode::Filled.warning(format!(
+            "\"{name}\": {} at {} filled with {how}: {shown}; do not trust the result there",
+            plural(count, "missing sample"),
+            plural(spans.len(), "place"),
+        ))
     })
 }

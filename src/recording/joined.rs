@@ -9,7 +9,7 @@ use super::stamps::{IrregularStep, StampGrid, first_missing, is_gap};
 use super::{Channel, RateFrom, TimeAxis};
 use crate::io::Reading;
 use crate::print::plural;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Number of typical steps above which a step is a break, whole or not.
 const LONG: f64 = 10.0;
@@ -120,31 +120,25 @@ impl JoinedBreaks {
                 time(repeat.after)
             )
         });
-        Some(Warning::new(
-            "rate-joins-gaps",
-            format!(
-                "{source}: the time stamps {}; --rate joins the samples on both sides, and all later times are wrong by \
-                 that amount. If the stamps are right, omit --rate, and fill gaps with --fill linear or exclude them \
-                 with --range{}",
-                said.join(" and "),
-                repeats.unwrap_or_default()
-            ),
-        ))
+        Some(WarningCode::RateJoinsGaps.warning(format!(
+            "{source}: the time stamps {}; --rate joins the samples on both sides, and all later times are wrong by \
+             that amount. If the stamps are right, omit --rate, and fill gaps with --fill linear or exclude them \
+             with --range{}",
+            said.join(" and "),
+            repeats.unwrap_or_default()
+        )))
     }
 
     /// Warning about repeated stamps, if there are no other breaks.
     fn repeated(&self, source: &str, grid: &StampGrid) -> Option<Warning> {
         let first = self.first_repeat?;
-        Some(Warning::new(
-            "rate-keeps-repeats",
-            format!(
-                "{source}: {} the one before, first at {}: if those rows were written twice, --rate takes each for a \
-                 further sample, so that all later times are late and every repeat is a kink; omit --rate, and drop \
-                 them with --resample",
-                plural_verb(self.repeats, "time stamp repeats", "time stamps repeat"),
-                grid.time_text(first.after)
-            ),
-        ))
+        Some(WarningCode::RateKeepsRepeats.warning(format!(
+            "{source}: {} the one before, first at {}: if those rows were written twice, --rate takes each for a \
+             further sample, so that all later times are late and every repeat is a kink; omit --rate, and drop \
+             them with --resample",
+            plural_verb(self.repeats, "time stamp repeats", "time stamps repeat"),
+            grid.time_text(first.after)
+        )))
     }
 }
 

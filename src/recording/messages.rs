@@ -12,7 +12,7 @@ use crate::io::mcap::{
 };
 use crate::io::{ChannelChoice, Input, Reading};
 use crate::unit::NamedUnit;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// The selected numbers in the given order, or the only one in the file. Their stamps are relative to the first
 /// sample of the first one.
@@ -221,7 +221,7 @@ pub(super) fn losses(summary: SignalSummary) -> (Option<Warning>, Vec<Warning>) 
     let mut warnings = summary.warnings;
     let lost = summary.is_lossy.then(|| {
         let first = (!warnings.is_empty()).then(|| warnings.remove(0));
-        first.unwrap_or_else(|| Warning::new("mcap-lost", "messages were lost"))
+        first.unwrap_or_else(|| WarningCode::McapLost.warning("messages were lost"))
     });
     (lost, warnings)
 }

@@ -14,7 +14,7 @@ use super::shared_stamps::{refuse_shared_stamps, same_stamps};
 use super::uneven::{mean_step, no_step};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Minimum reported rounding of stamps, relative to their step.
 pub(crate) const COARSE_STAMPS: f64 = 0.25;
@@ -219,17 +219,14 @@ impl StampGrid {
         let of_seconds = self.seconds_per_unit;
         let rate_hz = 1.0 / (self.step * of_seconds);
         self.is_rounded_coarsely().then(|| {
-            Warning::new(
-                "rounded-time-stamps",
-                format!(
-                    "{source}: the time stamps are rounded to {} s; apart from that they are uniform, and together \
-                     they give {} Hz (to within {} Hz){}",
-                    digits::text(self.quantum * of_seconds, 3),
-                    digits::text(rate_hz, 9),
-                    digits::text(rate_hz * self.quantum / span, 2),
-                    same_stamps(self.quantum / self.step, self.quantum * of_seconds),
-                ),
-            )
+            WarningCode::RoundedTimeStamps.warning(format!(
+                "{source}: the time stamps are rounded to {} s; apart from that they are uniform, and together \
+                 they give {} Hz (to within {} Hz){}",
+                digits::text(self.quantum * of_seconds, 3),
+                digits::text(rate_hz, 9),
+                digits::text(rate_hz * self.quantum / span, 2),
+                same_stamps(self.quantum / self.step, self.quantum * of_seconds),
+            ))
         })
     }
 

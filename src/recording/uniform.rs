@@ -11,7 +11,7 @@ use super::text::ChannelPlan;
 use super::validator::{StreamSummary, StreamValidator};
 use crate::failure::Failure;
 use crate::print::{plural, rounded};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// A channel on a uniform time axis, block by block; interpolated if requested.
 pub(crate) struct UniformStream {
@@ -111,7 +111,7 @@ pub(crate) fn doubts(resampled: &Resampled) -> Vec<Warning> {
             rounded(resampled.longest_step_s, 4),
             plural(resampled.repeated, "repeated time stamp")
         );
-        warnings.push(Warning::new("resampled-gaps", message));
+        warnings.push(WarningCode::ResampledGaps.warning(message));
     }
     if resampled.uneven > 0 {
         let message = format!(
@@ -119,7 +119,7 @@ pub(crate) fn doubts(resampled: &Resampled) -> Vec<Warning> {
              recorder sampled uniformly and these are times of arrival, give --rate HZ instead of --resample",
             plural(resampled.uneven, "sample"),
         );
-        warnings.push(Warning::new("resampled-uneven", message));
+        warnings.push(WarningCode::ResampledUneven.warning(message));
     }
     warnings
 }

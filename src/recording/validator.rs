@@ -9,10 +9,8 @@ use super::stamps::IrregularStep;
 use super::text::{ChannelPlan, Layout, LineNotes, Problem, is_end_of_data};
 use crate::failure::{ErrorCode, ErrorPlace, Failure, RowKind};
 use crate::print::plural;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
-/// Code of the warning about irregular stamps.
-const IRREGULAR: &str = "irregular-stamps";
 /// Minimum reported relative difference of the mean rate from that of the first rows.
 const RATE_DRIFT: f64 = 1e-4;
 
@@ -156,10 +154,15 @@ impl StreamValidator {
 
     /// Warns once about irregular stamps.
     fn say_irregular(&mut self, line: usize, found: &IrregularStep) {
-        if !self.warnings.iter().any(|w| w.code == IRREGULAR) {
+        if !self
+            .warnings
+            .iter()
+            .any(|w| w.code == WarningCode::IrregularStamps.name())
+        {
             let place = ErrorPlace::of_row(&self.source, self.row_kind, line);
             let message = format!("{place}: {}", self.explain(found));
-            self.warnings.push(Warning::new(IRREGULAR, message));
+            self.warnings
+                .push(WarningCode::IrregularStamps.warning(message));
         }
     }
 
@@ -318,16 +321,13 @@ impl StreamValidator {
             return;
         };
         if (samples - steps).abs() > RATE_DRIFT * samples + rounding {
-            self.warnings.push(Warning::new(
-                "rate-drift",
-                format!(
-                    "{}: the rate of the first rows is {} Hz, that of the whole record {} Hz on average; the rate of \
-                     the first rows was used",
-                    self.source,
-                    digits::text(rate_hz, 7),
-                    digits::text(rate_hz * samples / steps, 7)
-                ),
-            ));
+            self.warnings.push(WarningCode::RateDrift.warning(format!(
+                "{}: the rate of the first rows is {} Hz, that of the whole record {} Hz on average; the rate of \
+                 the first rows was used",
+                self.source,
+                digits::text(rate_hz, 7),
+                digits::text(rate_hz * samples / steps, 7)
+            )));
         }
     }
 }

@@ -9,7 +9,7 @@ use super::{ConstantStd, Stand, TransducerSignal, heading_scale};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::rounded;
 use crate::unit::{NamedUnit, OF_FULL_SCALE, RecordedChannel};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// The applied quantity: its name and printed unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,16 +112,13 @@ impl RecordedLevels {
         {
             return None;
         }
-        Some(Warning::new(
-            "zero-far-from-record",
-            format!(
-                "[recorder] zero = \"{}\" is more than {} times any sample of the record: the result is little more \
-                 than an offset of about {} {unit}; check the value of the zero and its unit",
-                self.zero,
-                rounded(1.0 / NEAR_NOTHING, 2),
-                rounded(offset * scale, 3)
-            ),
-        ))
+        Some(WarningCode::ZeroFarFromRecord.warning(format!(
+            "[recorder] zero = \"{}\" is more than {} times any sample of the record: the result is little more \
+             than an offset of about {} {unit}; check the value of the zero and its unit",
+            self.zero,
+            rounded(1.0 / NEAR_NOTHING, 2),
+            rounded(offset * scale, 3)
+        )))
     }
 
     /// A warning if most of a record in V exceeds the output of a bridge amplifier.
@@ -132,14 +129,11 @@ impl RecordedLevels {
             .map(|t| ((t - self.of_nothing) / per_volt).abs());
         let beyond = volts.clone().filter(|v| *v > MOST_VOLTS).count();
         (2 * beyond > samples.len()).then(|| {
-            Warning::new(
-                "volts-unusual",
-                format!(
-                    "the record reaches {} V, more than bridge amplifiers and recorders output; if it is in mV, give \
-                     --unit mV",
-                    rounded(volts.fold(0.0, f64::max), 3)
-                ),
-            )
+            WarningCode::VoltsUnusual.warning(format!(
+                "the record reaches {} V, more than bridge amplifiers and recorders output; if it is in mV, give \
+                 --unit mV",
+                rounded(volts.fold(0.0, f64::max), 3)
+            ))
         })
     }
 }
@@ -292,15 +286,12 @@ impl Stand {
     fn unused_zero(&self, signal: Option<TransducerSignal>, named: &NamedUnit) -> Option<Warning> {
         let (of, zero) = self.recorder.zero.as_ref()?;
         (zero.value() != 0.0 && Some(*of) != signal).then(|| {
-            Warning::new(
-                "zero-not-used",
-                format!(
-                    "[recorder] zero of {} is in {}, but the record is in {}: the zero was not subtracted",
-                    self.file,
-                    of.usual_unit().0,
-                    named.text
-                ),
-            )
+            WarningCode::ZeroNotUsed.warning(format!(
+                "[recorder] zero of {} is in {}, but the record is in {}: the zero was not subtracted",
+                self.file,
+                of.usual_unit().0,
+                named.text
+            ))
         })
     }
 

@@ -6,7 +6,7 @@ use super::section::Section;
 use super::{BeamDrawing, Friction};
 use crate::failure::Failure;
 use crate::print::short;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Range of elastic moduli of solids, from rubber to diamond.
 const SOLID_PA: std::ops::RangeInclusive<f64> = 1e6..=1.3e12;
@@ -17,13 +17,10 @@ const BEAM_PA: std::ops::RangeInclusive<f64> = 1e9..=7e11;
 pub(super) fn unusual_modulus(beam: &BeamDrawing) -> Option<Warning> {
     let modulus_pa = beam.modulus.value();
     (!BEAM_PA.contains(&modulus_pa)).then(|| {
-        Warning::new(
-            "modulus-unusual",
-            format!(
-                "[beam] elastic_modulus is {} GPa, unlike any common beam material: steel has 200 GPa; check its unit",
-                short(modulus_pa / 1e9)
-            ),
-        )
+        WarningCode::ModulusUnusual.warning(format!(
+            "[beam] elastic_modulus is {} GPa, unlike any common beam material: steel has 200 GPa; check its unit",
+            short(modulus_pa / 1e9)
+        ))
     })
 }
 

@@ -16,7 +16,7 @@ use crate::failure::Failure;
 use crate::file_name::ShowPath;
 use crate::io::storage;
 use crate::print::short;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// The schema of a stand file.
 const SCHEMA: &str = "torqcomp.stand/1";
@@ -155,14 +155,11 @@ fn check_schema(top: &Section) -> Result<(), Failure> {
 fn oddities(stand: &Stand) -> Vec<Warning> {
     let modes = stand.mechanics.iter().flat_map(Mechanics::damping_ratios);
     let overdamped = modes.filter(|ratio| *ratio > 1.0).map(|ratio| {
-        Warning::new(
-            "damping-above-one",
-            format!(
-                "{}: the damping ratio is {}, so the stand does not ring; if this is a percentage, write 7 % as 0.07",
-                stand.file,
-                short(ratio)
-            ),
-        )
+        WarningCode::DampingAboveOne.warning(format!(
+            "{}: the damping ratio is {}, so the stand does not ring; if this is a percentage, write 7 % as 0.07",
+            stand.file,
+            short(ratio)
+        ))
     });
     let modulus = stand.beam.as_ref().and_then(unusual_modulus);
     let left = stand
@@ -189,29 +186,23 @@ fn left_unexplained(stand: &Stand) -> Option<Warning> {
         "partly-explained" => "explained its records only in part",
         _ => return None,
     };
-    Some(Warning::new(
-        "diagnosis-incomplete",
-        format!(
-            "{}: the diagnosis that wrote this file {ending} ({}): its constants and effects compensate for model \
-             errors, so torque may be less accurate than with the previous file; compare both on a record with a known \
-             torque",
-            stand.file,
-            verdict.as_deref().unwrap_or_default(),
-        ),
-    ))
+    Some(WarningCode::DiagnosisIncomplete.warning(format!(
+        "{}: the diagnosis that wrote this file {ending} ({}): its constants and effects compensate for model \
+         errors, so torque may be less accurate than with the previous file; compare both on a record with a known \
+         torque",
+        stand.file,
+        verdict.as_deref().unwrap_or_default(),
+    )))
 }
 
 /// A warning if the order of a low-pass was assumed to be 1 (RC).
 fn assumed_order(stand: &Stand) -> Option<Warning> {
     stand.recorder.is_order_assumed.then(|| {
-        Warning::new(
-            "low-pass-order-assumed",
-            format!(
-                "{}: the order of [recorder] low_pass is not given: 1, an RC low-pass, was assumed; give \
-                 low_pass_order (anti-aliasing filters have 2 to 8)",
-                stand.file
-            ),
-        )
+        WarningCode::LowPassOrderAssumed.warning(format!(
+            "{}: the order of [recorder] low_pass is not given: 1, an RC low-pass, was assumed; give \
+             low_pass_order (anti-aliasing filters have 2 to 8)",
+            stand.file
+        ))
     })
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Stand, TransducerSignal};
 use crate::print::{rounded, with_std};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Minimum difference of two gains, in standard uncertainties and relative to the gain.
 const GAINS_DIFFER: (f64, f64) = (3.0, 1e-3);
@@ -22,14 +22,11 @@ pub(crate) fn gain_differs(
             Some(std) => with_std(gain, std),
             None => rounded(gain, 6),
         };
-        Warning::new(
-            "gain-differs",
-            format!(
-                "{source} a {name} of {found} {unit}, {} times the {} {unit} {of_known}",
-                rounded(gain / known, 4),
-                rounded(known, 6)
-            ),
-        )
+        WarningCode::GainDiffers.warning(format!(
+            "{source} a {name} of {found} {unit}, {} times the {} {unit} {of_known}",
+            rounded(gain / known, 4),
+            rounded(known, 6)
+        ))
     })
 }
 
@@ -37,13 +34,10 @@ impl Stand {
     /// A warning if the gain between bridge and record is not given.
     pub(super) fn assumed_gain(&self) -> Option<Warning> {
         (!self.recorder.has_gain).then(|| {
-            Warning::new(
-                "gain-assumed",
-                format!(
-                    "{} does not give the gain between bridge and record: 1 was assumed; add [recorder] gain",
-                    self.file
-                ),
-            )
+            WarningCode::GainAssumed.warning(format!(
+                "{} does not give the gain between bridge and record: 1 was assumed; add [recorder] gain",
+                self.file
+            ))
         })
     }
 
@@ -52,14 +46,11 @@ impl Stand {
         let gain = self.recorder.recorder.gain();
         let is_unused = signal == TransducerSignal::Voltage && self.gage.is_none() && gain != 1.0;
         is_unused.then(|| {
-            Warning::new(
-                "gain-not-used",
-                format!(
-                    "[calibration] of {} is torque per recorded volt, so [recorder] gain = {gain} was not used; if it \
-                     is per volt of the bridge, divide it by the gain, and omit the gain",
-                    self.file
-                ),
-            )
+            WarningCode::GainNotUsed.warning(format!(
+                "[calibration] of {} is torque per recorded volt, so [recorder] gain = {gain} was not used; if it \
+                 is per volt of the bridge, divide it by the gain, and omit the gain",
+                self.file
+            ))
         })
     }
 }

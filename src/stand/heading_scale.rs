@@ -1,20 +1,17 @@
 //! Scale factors in the heading of a channel.
 
 use crate::unit::{NamedUnit, RecordedChannel, factor, inside_brackets, scale_in};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// A warning if the heading of a channel contains a scale factor, as in `x10`, `*1000`, `× 0.1`, `(x100)`, `/10`,
 /// `0.1 x`, `[0.1 N m]` or `(Nm/10)`.
 pub(super) fn unapplied(channel: RecordedChannel) -> Option<Warning> {
     let heading = channel.name;
     let scale = scaled_unit(channel).or_else(|| scale_in(heading))?;
-    Some(Warning::new(
-        "scale-in-heading",
-        format!(
-            "the heading of \"{heading}\" contains a scale factor, \"{scale}\", which was not applied to the numbers; if \
-             it should be, scale the column and rename it"
-        ),
-    ))
+    Some(WarningCode::ScaleInHeading.warning(format!(
+        "the heading of \"{heading}\" contains a scale factor, \"{scale}\", which was not applied to the numbers; if \
+         it should be, scale the column and rename it"
+    )))
 }
 
 /// The unit of a channel, or what stands in brackets behind its name, if it is a unit with a scale.

@@ -10,7 +10,7 @@ use super::signal::TransducerSignal;
 use super::{BridgeData, GageData, RecorderData};
 use crate::failure::Failure;
 use crate::print::short;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Smallest plausible gain of an amplifier; a smaller value is another quantity.
 const LEAST_GAIN: f64 = 0.01;
@@ -25,14 +25,11 @@ pub(super) fn unusual_gage_factor(gage: &GageData) -> Option<Warning> {
         .iter()
         .any(|range| range.contains(&factor.abs()));
     (!is_usual).then(|| {
-        Warning::new(
-            "gage-factor-unusual",
-            format!(
-                "[gage] gage_factor is {}, unlike any common gage: metal foil has about 2, semiconductors 50 to 180; \
-                 the torque is wrong by the same factor",
-                short(factor)
-            ),
-        )
+        WarningCode::GageFactorUnusual.warning(format!(
+            "[gage] gage_factor is {}, unlike any common gage: metal foil has about 2, semiconductors 50 to 180; \
+             the torque is wrong by the same factor",
+            short(factor)
+        ))
     })
 }
 

@@ -9,7 +9,7 @@ use super::{Given, Mechanics, StandResponse, StaticGain};
 use crate::failure::Failure;
 use crate::identify::Motion;
 use crate::print::short;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Implausibly large contribution of modes above the band to the static response.
 const MUCH: f64 = 0.5;
@@ -84,15 +84,12 @@ impl Mechanics {
         };
         let left = modes.residual();
         (left.abs() > MUCH && self.measures == Motion::Displacement).then(|| {
-            Warning::new(
-                "residues-do-not-add-up",
-                format!(
-                    "{file}: the residues of [[modes]] add up to {}, which leaves {} of the static response to modes \
-                     above the band; check them: residues are fractions of 1",
-                    short(1.0 - left),
-                    short(left)
-                ),
-            )
+            WarningCode::ResiduesDoNotAddUp.warning(format!(
+                "{file}: the residues of [[modes]] add up to {}, which leaves {} of the static response to modes \
+                 above the band; check them: residues are fractions of 1",
+                short(1.0 - left),
+                short(left)
+            ))
         })
     }
 }

@@ -1,7 +1,7 @@
 //! Plausibility of a record against the rated torque of a transducer.
 
 use crate::print::{rounded, short};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Torque relative to the rated one above which it is doubtful: about the safe overload of transducers.
 const FAR_BEYOND: f64 = 1.5;
@@ -12,31 +12,25 @@ const FAR_BELOW: f64 = 5e-3;
 pub fn off_rated(largest: f64, rated: Option<f64>, unit: &str) -> Option<Warning> {
     let rated = rated?;
     if largest > 0.0 && largest < FAR_BELOW * rated {
-        return Some(Warning::new(
-            "below-rated-torque",
-            format!(
-                "the torque stays within {} {unit}, {} % of the transducer's rated torque of {} {unit}, as if the \
-                 record were not amplified by the stand's gain, or in another unit: check unit and gain of the \
-                 channel",
-                rounded(largest, 3),
-                rounded(100.0 * largest / rated, 2),
-                short(rated)
-            ),
-        ));
+        return Some(WarningCode::BelowRatedTorque.warning(format!(
+            "the torque stays within {} {unit}, {} % of the transducer's rated torque of {} {unit}, as if the \
+             record were not amplified by the stand's gain, or in another unit: check unit and gain of the \
+             channel",
+            rounded(largest, 3),
+            rounded(100.0 * largest / rated, 2),
+            short(rated)
+        )));
     }
     if !is_far_beyond_rated(largest, rated) {
         return None;
     }
-    Some(Warning::new(
-        "beyond-rated-torque",
-        format!(
-            "the torque reaches {} {unit}, {} times the transducer's rated torque of {} {unit}: check unit, gain and \
-             zero of the channel",
-            short(largest),
-            rounded(largest / rated, 3),
-            short(rated)
-        ),
-    ))
+    Some(WarningCode::BeyondRatedTorque.warning(format!(
+        "the torque reaches {} {unit}, {} times the transducer's rated torque of {} {unit}: check unit, gain and \
+         zero of the channel",
+        short(largest),
+        rounded(largest / rated, 3),
+        short(rated)
+    )))
 }
 
 /// Whether a torque is far above the rated one.

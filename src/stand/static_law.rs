@@ -9,7 +9,7 @@ use torqcomp_model::{Estimate, Kind, UnitSystem};
 use super::{CalibrationLaw, ConstantStd, MeasuredCalibration, Stand, TransducerSignal};
 use crate::failure::{ErrorCode, Failure};
 use crate::unit::NamedUnit;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Static conversion from a record in SI units to torque in N m.
 pub(super) struct StaticLaw {
@@ -59,17 +59,14 @@ impl Stand {
         let is_of_beam = matches!(signal, TransducerSignal::Strain | TransducerSignal::Force);
         if is_of_beam && self.beam.is_some() {
             let mut law = self.by_drawing(signal, zero.unwrap_or(0.0), units)?;
-            law.warnings.push(Warning::new(
-                "calibration-not-used",
-                format!(
-                    "the channel \"{channel}\" is in {}, and [calibration] of {} is in {}: the record was converted \
-                     with the beam's dimensions; record in {} to use the calibration",
-                    named.text,
-                    self.file,
-                    measured.signal.usual_unit().0,
-                    measured.signal.usual_unit().0
-                ),
-            ));
+            law.warnings.push(WarningCode::CalibrationNotUsed.warning(format!(
+                "the channel \"{channel}\" is in {}, and [calibration] of {} is in {}: the record was converted \
+                 with the beam's dimensions; record in {} to use the calibration",
+                named.text,
+                self.file,
+                measured.signal.usual_unit().0,
+                measured.signal.usual_unit().0
+            )));
             return Ok(law);
         }
         let remedy = match signal {

@@ -143,7 +143,7 @@ pub fn update(name: &str, existing: Option<&str>, entries: &[Entry]) -> Result<S
                 name,
                 format_args!(
                     "this is not a stand file (schema = \"{SCHEMA}\" is missing); write to another \
-                 file"
+                     file"
                 ),
             ));
         }
@@ -298,7 +298,7 @@ fn put(name: &str, document: &mut DocumentMut, entry: &Entry) -> Result<(), Fail
             name,
             format_args!(
                 "[{}] has {other}, so that {} cannot be written beside it; remove it, or write to \
-             another file",
+                 another file",
                 entry.section, entry.key
             ),
         ));

@@ -6,7 +6,7 @@ use torqcomp_dsp::spectrum::PowerSum;
 use super::band::{BandReport, BandSource};
 use super::report::CompensateReport;
 use crate::print::{rounded, short};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Power above the band relative to that in the part from which the band was chosen.
 const OF_CHOSEN: f64 = 2.0;
@@ -61,17 +61,14 @@ impl AboveBand {
         let [from, to] = range.map(|sample| {
             report.time_text(report.start.seconds() + sample as f64 / report.rate_hz)
         });
-        Some(Warning::new(
-            "signal-above-band",
-            format!(
-                "between {from} and {to}, {} {} rms of the record lie above the band of {} Hz and are removed; the band \
-                 was chosen from the first {} s, where there is less: give a higher --band",
-                rounded(rms, 3),
-                report.unit,
-                short(report.band_hz),
-                rounded(self.chosen_from as f64 / report.rate_hz, 3)
-            ),
-        ))
+        Some(WarningCode::SignalAboveBand.warning(format!(
+            "between {from} and {to}, {} {} rms of the record lie above the band of {} Hz and are removed; the band \
+             was chosen from the first {} s, where there is less: give a higher --band",
+            rounded(rms, 3),
+            report.unit,
+            short(report.band_hz),
+            rounded(self.chosen_from as f64 / report.rate_hz, 3)
+        )))
     }
 }
 

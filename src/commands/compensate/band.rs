@@ -17,7 +17,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::print::{rounded, short};
 use crate::recording::{ChannelStream, FirstSamples};
 use crate::stand::Calibration;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// The band of `--band rated`, that of the thesis, as far as the rate allows.
 const RATED_BAND_HZ: f64 = 2400.0;
@@ -237,17 +237,14 @@ impl BandReport {
                 rounded(from_hz, 3)
             ),
         };
-        Some(Warning::new(
-            "lines-decide-band",
-            format!(
-                "the band extends to {} Hz only because of {which} at {} Hz: {} {unit} rms of the result. If that is \
-                 interference (from a switching converter, say) and not torque, give --band {}",
-                short(self.top_hz),
-                rounded(lines.frequency_hz, 4),
-                rounded(of_lines, 3),
-                short(lines.without_hz)
-            ),
-        ))
+        Some(WarningCode::LinesDecideBand.warning(format!(
+            "the band extends to {} Hz only because of {which} at {} Hz: {} {unit} rms of the result. If that is \
+             interference (from a switching converter, say) and not torque, give --band {}",
+            short(self.top_hz),
+            rounded(lines.frequency_hz, 4),
+            rounded(of_lines, 3),
+            short(lines.without_hz)
+        )))
     }
 
     /// Whether it was given by `--band`.

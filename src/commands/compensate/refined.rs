@@ -9,7 +9,7 @@ use crate::inverse::{Carried, ChainInverse, InverseResult, RecordWindow, Spread}
 use crate::print::{plural, rounded, some_of};
 use crate::recording::UniformRecord;
 use crate::stand::{ConstantStd, Stand};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Maximum number of samples of a record inverted as a whole, at about 100 bytes of memory each.
 const MOST_SAMPLES: usize = 1 << 24;
@@ -205,27 +205,21 @@ fn describe(report: &mut CompensateReport, undone: &InverseResult, scales: &Scal
         report.lost.extend(spans.iter().map(span));
     }
     for line in undone.lines.iter().filter(|line| line.share < SURE) {
-        report.warnings.push(Warning::new(
-            "phase-hidden",
-            format!(
-                "the signal masks the phase of the line or of the spikes at {} Hz: only {} % of the amplitude was \
-                 removed; record without excitation at this frequency",
-                rounded(line.frequency_hz, 5),
-                rounded(100.0 * line.share, 2)
-            ),
-        ));
+        report.warnings.push(WarningCode::PhaseHidden.warning(format!(
+            "the signal masks the phase of the line or of the spikes at {} Hz: only {} % of the amplitude was \
+             removed; record without excitation at this frequency",
+            rounded(line.frequency_hz, 5),
+            rounded(100.0 * line.share, 2)
+        )));
     }
     if let Some(rest) = undone.at_rest.filter(|rest| rest.part > STUCK) {
-        report.warnings.push(Warning::new(
-            "direction-unknown",
-            format!(
-                "over {} % of the record the speed is not significantly different from zero: the direction of the \
-                 friction is unknown there, and its part of the torque uncertain by {} {} (rms over the record)",
-                rounded(100.0 * rest.part, 2),
-                rounded(rest.variance.sqrt() * scales.printed.abs(), 2),
-                report.unit
-            ),
-        ));
+        report.warnings.push(WarningCode::DirectionUnknown.warning(format!(
+            "over {} % of the record the speed is not significantly different from zero: the direction of the \
+             friction is unknown there, and its part of the torque uncertain by {} {} (rms over the record)",
+            rounded(100.0 * rest.part, 2),
+            rounded(rest.variance.sqrt() * scales.printed.abs(), 2),
+            report.unit
+        )));
     }
 }
 
@@ -256,22 +250,19 @@ fn spans(samples: &[usize], scales: &Scales) -> Vec<[f64; 2]> {
 fn lost_warning(effect: &str, lost: &Unrecovered, spans: &[[f64; 2]], scales: &Scales) -> Warning {
     let told = spans.iter();
     let told = told.map(|[from, to]| format!("{} to {} s", rounded(*from, 7), rounded(*to, 7)));
-    Warning::new(
-        "not-recovered",
-        format!(
-            "{}: {}; {}, from {}: within {} ms of {} the torque is not recovered",
-            effect,
-            lost.why,
-            plural(lost.samples.len(), "sample"),
-            some_of(told, spans.len(), SPANS_TOLD),
-            rounded(1e3 * scales.reach_s, 2),
-            if lost.samples.len() == 1 {
-                "it"
-            } else {
-                "them"
-            }
-        ),
-    )
+    WarningCode::NotRecovered.warning(format!(
+        "{}: {}; {}, from {}: within {} ms of {} the torque is not recovered",
+        effect,
+        lost.why,
+        plural(lost.samples.len(), "sample"),
+        some_of(told, spans.len(), SPANS_TOLD),
+        rounded(1e3 * scales.reach_s, 2),
+        if lost.samples.len() == 1 {
+            "it"
+        } else {
+            "them"
+        }
+    ))
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use crate::inverse::ChainInverse;
 use crate::print::{rounded, short};
 use crate::quality::excerpt;
 use crate::stand::{Stand, off_rated};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Gain from which a record of unknown noise gets a warning.
 const LARGE_GAIN: f64 = 10.0;
@@ -67,44 +67,35 @@ pub(super) fn of_ringing(stand: &Stand, rate_hz: f64) -> Option<Warning> {
     let low_pass = stand.recorder.low_pass;
     let is_kept_out = low_pass.is_some_and(|low_pass| low_pass.cutoff_hz <= limit_hz);
     (!is_kept_out && mode.damping_ratio < 0.5).then(|| {
-        Warning::new(
-            "resonance-above-nyquist",
-            format!(
-                "the stand resonates at {} Hz, above half the sampling rate of {} Hz: after steps and shocks its \
-                 ringing aliases into the record and cannot be removed; record at {} Hz or more, or through a low-pass \
-                 (declared as [recorder] low_pass)",
-                rounded(resonance_hz, 4),
-                short(rate_hz),
-                rounded(5.0 * resonance_hz, 2)
-            ),
-        )
+        WarningCode::ResonanceAboveNyquist.warning(format!(
+            "the stand resonates at {} Hz, above half the sampling rate of {} Hz: after steps and shocks its \
+             ringing aliases into the record and cannot be removed; record at {} Hz or more, or through a low-pass \
+             (declared as [recorder] low_pass)",
+            rounded(resonance_hz, 4),
+            short(rate_hz),
+            rounded(5.0 * resonance_hz, 2)
+        ))
     })
 }
 
 /// A warning if the ends of the record affect the result beyond the filter's own ends.
 pub(super) fn of_ends(undo: Option<&ChainInverse>, edge_s: f64) -> Option<Warning> {
     let effect = undo?.endless()?;
-    Some(Warning::new(
-        "ends-felt-far",
-        format!(
-            "the inverse of \"{effect}\" is infinitely long: what happened before and after the record affects more \
-             than the first and last {} s, and decreases only in proportion to the distance; discard more at both \
-             ends, or record from rest to rest",
-            rounded(edge_s, 3)
-        ),
-    ))
+    Some(WarningCode::EndsFeltFar.warning(format!(
+        "the inverse of \"{effect}\" is infinitely long: what happened before and after the record affects more \
+         than the first and last {} s, and decreases only in proportion to the distance; discard more at both \
+         ends, or record from rest to rest",
+        rounded(edge_s, 3)
+    )))
 }
 
 /// A warning if the record does not contain the mean torque.
 pub(super) fn of_mean(undo: Option<&ChainInverse>) -> Option<Warning> {
     let effect = undo?.blocks_constants()?;
-    Some(Warning::new(
-        "mean-unknown",
-        format!(
-            "\"{effect}\" does not pass a constant, so the mean of the torque and its slope over the record are unknown, \
-             and those of the result are arbitrary; record with DC coupling if you need them"
-        ),
-    ))
+    Some(WarningCode::MeanUnknown.warning(format!(
+        "\"{effect}\" does not pass a constant, so the mean of the torque and its slope over the record are unknown, \
+         and those of the result are arbitrary; record with DC coupling if you need them"
+    )))
 }
 
 /// Natural frequency in Hz and damping ratio of a stand's modes.
@@ -131,18 +122,15 @@ fn of_resonance<'a>(
         .or_else(|| dominant_resonance(&seen.excerpt, rate_hz, modes))
         .or_else(|| rest().and_then(rings))?;
     let declared_hz = report.modes[0].0;
-    Some(Warning::new(
-        "resonance-elsewhere",
-        format!(
-            "the record has a resonance at {} Hz (damping ratio about {}) and none at {} Hz, the natural frequency in \
-             the stand file{}: if it is the stand's, the result is wrong. Record a tap on the stand as it is and \
-             determine its constants with identify decay; if it is the machine's, ignore this",
-            rounded(found.frequency_hz, 3),
-            rounded(found.damping_ratio, 1),
-            rounded(declared_hz, 4),
-            of_turns(declared_hz, found.frequency_hz).unwrap_or_default()
-        ),
-    ))
+    Some(WarningCode::ResonanceElsewhere.warning(format!(
+        "the record has a resonance at {} Hz (damping ratio about {}) and none at {} Hz, the natural frequency in \
+         the stand file{}: if it is the stand's, the result is wrong. Record a tap on the stand as it is and \
+         determine its constants with identify decay; if it is the machine's, ignore this",
+        rounded(found.frequency_hz, 3),
+        rounded(found.damping_ratio, 1),
+        rounded(declared_hz, 4),
+        of_turns(declared_hz, found.frequency_hz).unwrap_or_default()
+    )))
 }
 
 /// A warning if the record rings at the declared natural frequency with another damping.
@@ -156,17 +144,14 @@ fn of_damping<'a>(
     };
     let found = |samples: &[f64]| other_damping(samples, report.rate_hz, declared);
     let found = found(&seen.excerpt).or_else(|| rest().and_then(found))?;
-    Some(Warning::new(
-        "damping-differs",
-        format!(
-            "the resonance of the record at {} Hz has a damping ratio of about {}, {} in the stand file: if it is the \
-             stand's, the result is wrong by up to their ratio near that frequency. Record a tap on the stand as it is \
-             and determine its constants with identify decay",
-            rounded(found.frequency_hz, 3),
-            rounded(found.damping_ratio, 1),
-            rounded(declared.1, 3)
-        ),
-    ))
+    Some(WarningCode::DampingDiffers.warning(format!(
+        "the resonance of the record at {} Hz has a damping ratio of about {}, {} in the stand file: if it is the \
+         stand's, the result is wrong by up to their ratio near that frequency. Record a tap on the stand as it is \
+         and determine its constants with identify decay",
+        rounded(found.frequency_hz, 3),
+        rounded(found.damping_ratio, 1),
+        rounded(declared.1, 3)
+    )))
 }
 
 /// Largest relative deviation of the ratio of two frequencies from 2π.
@@ -194,14 +179,11 @@ fn of_turns(declared_hz: f64, found_hz: f64) -> Option<String> {
 fn of_unknown_noise(report: &CompensateReport) -> Option<Warning> {
     let gain = report.noise.largest_gain;
     (gain > LARGE_GAIN && report.band.is_given()).then(|| {
-        Warning::new(
-            "noise-unknown",
-            format!(
-                "the record is amplified up to {} times, and its noise is unknown; choose a lower --band if the result \
-                 looks noisy",
-                rounded(gain, 3)
-            ),
-        )
+        WarningCode::NoiseUnknown.warning(format!(
+            "the record is amplified up to {} times, and its noise is unknown; choose a lower --band if the result \
+             looks noisy",
+            rounded(gain, 3)
+        ))
     })
 }
 
@@ -222,30 +204,24 @@ fn empty_plot(report: &CompensateReport) -> Warning {
     let end = report
         .start
         .later((report.samples - 1) as f64 / report.rate_hz);
-    Warning::new(
-        "empty-plot",
-        format!(
-            "--plot-range contains no samples; the record runs from {} to {}",
-            report.start.text(),
-            end.text()
-        ),
-    )
+    WarningCode::EmptyPlot.warning(format!(
+        "--plot-range contains no samples; the record runs from {} to {}",
+        report.start.text(),
+        end.text()
+    ))
 }
 
 fn of_length(report: &CompensateReport) -> Option<Warning> {
     // Each end matters up to `edge_s`, most of it up to `reach_s`.
     let needed = (2.0 * report.reach_s).max(report.edge_s) * report.rate_hz;
     ((report.samples as f64) < needed).then(|| {
-        Warning::new(
-            "short-record",
-            format!(
-                "the record has {} samples, and all of the result depends on extrapolation beyond \
-                 its ends; record at least {} samples for a band of {} Hz",
-                report.samples,
-                needed as usize,
-                short(report.band_hz)
-            ),
-        )
+        WarningCode::ShortRecord.warning(format!(
+            "the record has {} samples, and all of the result depends on extrapolation beyond \
+             its ends; record at least {} samples for a band of {} Hz",
+            report.samples,
+            needed as usize,
+            short(report.band_hz)
+        ))
     })
 }
 
@@ -254,19 +230,16 @@ fn of_amplification(noise: &RecordNoise, report: &CompensateReport) -> Option<Wa
     let (unit, rms) = (&report.unit, report.result.rms);
     let amplifies = report.noise.largest_gain > 1.0;
     (amplifies && rms > AMPLIFIED * noise.in_band_rms).then(|| {
-        Warning::new(
-            "mostly-amplified",
-            format!(
-                "the result is {} times the record, {} instead of {} {unit} rms: nearly all of it comes from far above \
-                 the resonance, amplified up to {} times. Check the mechanics of the stand, the sampling rate of {} \
-                 Hz, and --band",
-                rounded(rms / noise.in_band_rms, 3),
-                rounded(rms, 3),
-                rounded(noise.in_band_rms, 3),
-                rounded(report.noise.largest_gain, 3),
-                short(report.rate_hz)
-            ),
-        )
+        WarningCode::MostlyAmplified.warning(format!(
+            "the result is {} times the record, {} instead of {} {unit} rms: nearly all of it comes from far above \
+             the resonance, amplified up to {} times. Check the mechanics of the stand, the sampling rate of {} \
+             Hz, and --band",
+            rounded(rms / noise.in_band_rms, 3),
+            rounded(rms, 3),
+            rounded(noise.in_band_rms, 3),
+            rounded(report.noise.largest_gain, 3),
+            short(report.rate_hz)
+        ))
     })
 }
 
@@ -274,16 +247,13 @@ fn of_noise(noise: &RecordNoise, report: &CompensateReport) -> Vec<Warning> {
     let (band_hz, unit, rms) = (report.band_hz, &report.unit, report.result.rms);
     let mut warnings = Vec::new();
     if noise.above_band_rms > ABOVE_BAND * noise.in_band_rms {
-        warnings.push(Warning::new(
-            "signal-above-band",
-            format!(
-                "{} {unit} rms of the record lie above the band of {} Hz and are removed; {} {unit} rms \
-                 lie within it",
-                rounded(noise.above_band_rms, 3),
-                short(band_hz),
-                rounded(noise.in_band_rms, 3)
-            ),
-        ));
+        warnings.push(WarningCode::SignalAboveBand.warning(format!(
+            "{} {unit} rms of the record lie above the band of {} Hz and are removed; {} {unit} rms \
+             lie within it",
+            rounded(noise.above_band_rms, 3),
+            short(band_hz),
+            rounded(noise.in_band_rms, 3)
+        )));
     }
     // A chosen band ends at the least expected error, possibly above the frequency where the noise equals the signal.
     let lost_from_hz = noise.lost_from_hz(band_hz);
@@ -300,30 +270,24 @@ fn of_noise(noise: &RecordNoise, report: &CompensateReport) -> Vec<Warning> {
              channel"
                 .to_owned()
         };
-        warnings.push(Warning::new(
-            "band-lost-in-noise",
-            format!(
-                "from {} to {} Hz the record is no larger than its noise, which the compensation \
-                 amplifies; {remedy}",
-                rounded(from_hz, 4),
-                short(band_hz)
-            ),
-        ));
+        warnings.push(WarningCode::BandLostInNoise.warning(format!(
+            "from {} to {} Hz the record is no larger than its noise, which the compensation \
+             amplifies; {remedy}",
+            rounded(from_hz, 4),
+            short(band_hz)
+        )));
     }
     warnings.extend(of_amplification(noise, report));
     if rms > 0.0 && noise.compensated_rms > NOISY_FRACTION * rms {
-        warnings.push(Warning::new(
-            "mostly-noise",
-            format!(
-                "noise makes up {} of {} {unit} rms of the result; {}",
-                rounded(noise.compensated_rms, 3),
-                rounded(rms, 3),
-                match report.band.is_given() {
-                    true => "choose a lower --band",
-                    false => "record with less noise",
-                }
-            ),
-        ));
+        warnings.push(WarningCode::MostlyNoise.warning(format!(
+            "noise makes up {} of {} {unit} rms of the result; {}",
+            rounded(noise.compensated_rms, 3),
+            rounded(rms, 3),
+            match report.band.is_given() {
+                true => "choose a lower --band",
+                false => "record with less noise",
+            }
+        )));
     }
     warnings
 }

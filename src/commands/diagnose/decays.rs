@@ -31,9 +31,9 @@ pub fn decays(args: &Diagnose, file: &Path) -> Result<Vec<Pair>, Failure> {
         values: &read.measured,
     };
     let doubts = decay::check(&ringing).map_err(|failure| failure.at(&read.source))?;
-    let named = doubts.into_iter().map(|doubt| {
-        let message = format!("{}: {}", read.source, doubt.message);
-        Warning::new(doubt.code, message)
+    let named = doubts.into_iter().map(|doubt| Warning {
+        message: format!("{}: {}", read.source, doubt.message),
+        ..doubt
     });
     let mut warnings = read.warnings;
     warnings.extend(named);

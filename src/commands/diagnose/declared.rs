@@ -8,7 +8,7 @@ use crate::diagnose::{DeclaredForm, EffectForm, PlainStand, SeveralModes};
 use crate::failure::Failure;
 use crate::identify::Motion;
 use crate::stand::{DeclaredEffect, DeclaredMode, Given, Stand};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// The plain stand of a stand file.
 pub(super) fn declared(stand: &Stand, gain: f64) -> Result<PlainStand, Failure> {
@@ -63,12 +63,9 @@ pub(super) fn torques_unknown(
             "record the displacement, strain or torque",
         ),
     };
-    Some(Warning::new(
-        "no-torques-tried",
-        format!(
-            "friction, play, nonlinear springs and other torques in the stand were not tried: {why}; {remedy}"
-        ),
-    ))
+    Some(WarningCode::NoTorquesTried.warning(format!(
+        "friction, play, nonlinear springs and other torques in the stand were not tried: {why}; {remedy}"
+    )))
 }
 
 /// The effects of the stand file.

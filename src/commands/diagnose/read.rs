@@ -22,7 +22,7 @@ use crate::print::short;
 use crate::recording::AlignedChannels;
 use crate::stand::{Calibration, Stand, TransducerSignal, si_unit};
 use crate::unit::{NamedUnit, RecordedChannel};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Minimum number of samples of a record.
 pub(super) const FEWEST: usize = 200;
@@ -206,10 +206,9 @@ fn held_out_instead(records: &mut Records, last_is_held_out: bool) -> Option<War
         }
         (false, false) => return None,
     };
-    Some(Warning::new(
-        "no-record-held-out",
-        format!("no hold-out record was given; {instead} held out instead"),
-    ))
+    Some(WarningCode::NoRecordHeldOut.warning(format!(
+        "no hold-out record was given; {instead} held out instead"
+    )))
 }
 
 /// The training and hold-out records.

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::print::short;
 use crate::recording::UniformRecord;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Warnings about the speed and the orders, and about components that are lost in noise.
 pub(super) fn warnings(
@@ -83,12 +83,9 @@ fn lost_warning(components: &[ComponentTorque]) -> Option<Warning> {
         .map(|c| short(c.order))
         .collect();
     (!lost.is_empty()).then(|| {
-        Warning::new(
-            "components-lost-in-noise",
-            format!(
-                "below twice their own uncertainty, so they may be zero: {}",
-                named(&lost)
-            ),
-        )
+        WarningCode::ComponentsLostInNoise.warning(format!(
+            "below twice their own uncertainty, so they may be zero: {}",
+            named(&lost)
+        ))
     })
 }

@@ -7,7 +7,7 @@ use torqcomp_dsp::store::SampleStore;
 use super::speed::highest;
 use crate::print::{rounded, short};
 use crate::recording::UniformRecord;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Maximum number of samples evaluated, in one block: an edge between two lines is narrow.
 const MOST: usize = 1 << 16;
@@ -41,16 +41,13 @@ pub(super) fn warning(
     let names: Vec<String> = beyond.iter().map(|order| short(*order)).collect();
     let highest_hz = fundamental_hz * highest(&beyond);
     (!names.is_empty()).then(|| {
-        Warning::new(
-            "orders-beyond-band",
-            format!(
-                "the record was filtered above about {} Hz, which removes part or all of {}; compensate again with \
-                 --band {} or more, or give harmonics the recorded channel and --stand",
-                rounded(top_hz, 2),
-                super::named(&names),
-                rounded(1.05 * highest_hz, 3)
-            ),
-        )
+        WarningCode::OrdersBeyondBand.warning(format!(
+            "the record was filtered above about {} Hz, which removes part or all of {}; compensate again with \
+             --band {} or more, or give harmonics the recorded channel and --stand",
+            rounded(top_hz, 2),
+            super::named(&names),
+            rounded(1.05 * highest_hz, 3)
+        ))
     })
 }
 

@@ -6,7 +6,7 @@ use torqcomp_dsp::store::SampleStore;
 use super::speed::{FEWEST, MOST, is_sure};
 use crate::print::rounded;
 use crate::recording::UniformRecord;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Maximum and minimum number of windows.
 const WINDOWS: usize = 16;
@@ -53,14 +53,11 @@ pub(super) fn warning(
     };
     let changing = (0..orders.len()).filter_map(of_order);
     let [order, low, high] = changing.max_by(|a, b| (a[2] - a[1]).total_cmp(&(b[2] - b[1])))?;
-    Some(Warning::new(
-        "amplitude-changes",
-        format!(
-            "the amplitude of order {} changes over the record, between {} and {} times its mean: the components are \
-             averages; select a shorter part with --range",
-            rounded(order, 4),
-            rounded(low, 2),
-            rounded(high, 2)
-        ),
-    ))
+    Some(WarningCode::AmplitudeChanges.warning(format!(
+        "the amplitude of order {} changes over the record, between {} and {} times its mean: the components are \
+         averages; select a shorter part with --range",
+        rounded(order, 4),
+        rounded(low, 2),
+        rounded(high, 2)
+    )))
 }

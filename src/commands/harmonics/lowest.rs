@@ -3,7 +3,7 @@
 
 use super::speed::sure_orders;
 use crate::print::{enumeration, rounded};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Highest multiple of the speed that the lowest common multiple of the lines may be.
 const MULTIPLES: u32 = 16;
@@ -57,7 +57,7 @@ pub(super) fn instead_of(
             )
         }
     };
-    Some(Warning::new("fundamental-off", message))
+    Some(WarningCode::FundamentalOff.warning(message))
 }
 
 /// The significant orders at a fundamental.

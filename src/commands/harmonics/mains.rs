@@ -7,7 +7,7 @@ use torqcomp_dsp::store::SampleStore;
 use super::speed::is_sure;
 use super::{ComponentTorque, named};
 use crate::print::short;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Mains orders checked.
 const MAINS_LINES: f64 = 5.0;
@@ -83,13 +83,10 @@ pub(super) fn warning(components: &[ComponentTorque], duration_s: f64) -> Option
                 short(fundamental_hz)
             ),
         };
-        return Some(Warning::new(
-            "order-or-mains",
-            format!(
-                "{which}, so any order may contain mains pickup: record once with the motor off and the supply on, and \
-                 subtract its lines"
-            ),
-        ));
+        return Some(WarningCode::OrderOrMains.warning(format!(
+            "{which}, so any order may contain mains pickup: record once with the motor off and the supply on, and \
+             subtract its lines"
+        )));
     }
     let doubtful: Vec<String> = components
         .iter()
@@ -101,13 +98,10 @@ pub(super) fn warning(components: &[ComponentTorque], duration_s: f64) -> Option
         .map(|c| format!("{} ({:.2} Hz)", short(c.order), c.frequency_hz))
         .collect();
     (!doubtful.is_empty()).then(|| {
-        Warning::new(
-            "order-or-mains",
-            format!(
-                "mains lines coincide with {} and cannot be separated at a single speed: record at another speed, \
-                 which moves the orders but not the mains lines",
-                named(&doubtful)
-            ),
-        )
+        WarningCode::OrderOrMains.warning(format!(
+            "mains lines coincide with {} and cannot be separated at a single speed: record at another speed, \
+             which moves the orders but not the mains lines",
+            named(&doubtful)
+        ))
     })
 }

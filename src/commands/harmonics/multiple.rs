@@ -6,7 +6,7 @@ use torqcomp_dsp::store::SampleStore;
 use super::speed::{FEWEST, FIRST, SPAN, highest, is_sure};
 use crate::print::{enumeration, rounded};
 use crate::recording::UniformRecord;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Parts of the fundamental that may be the speed.
 const PARTS: [u32; 2] = [2, 3];
@@ -60,15 +60,12 @@ pub(super) fn other_unit(record: &UniformRecord, given_hz: f64, orders: &[f64]) 
         let start_hz = given_hz * hz;
         let found = refine_fundamental(&samples, record.rate_hz, start_hz, SPAN, &[1.0]).ok()?;
         has_any(found.frequency_hz).then(|| {
-            Warning::new(
-                "fundamental-off",
-                format!(
-                    "no order of {given} Hz stands out, but a line at {} Hz does: if the speed is {given} {unit}, give \
-                     --fundamental \"{given} {unit}\"",
-                    rounded(found.frequency_hz, 5),
-                    given = rounded(given_hz, 7),
-                ),
-            )
+            WarningCode::FundamentalOff.warning(format!(
+                "no order of {given} Hz stands out, but a line at {} Hz does: if the speed is {given} {unit}, give \
+                 --fundamental \"{given} {unit}\"",
+                rounded(found.frequency_hz, 5),
+                given = rounded(given_hz, 7),
+            ))
         })
     };
     match has_any(given_hz) {
@@ -132,15 +129,12 @@ fn said(strong: &[f64], (fundamental_hz, part): (f64, u32), speed_hz: f64) -> Wa
         1 => ("a strong line lies", "order"),
         _ => ("strong lines lie", "orders"),
     };
-    Warning::new(
-        "lines-between-orders",
-        format!(
-            "{lines} between the orders of {} Hz, at {} Hz: if the speed is {speed} Hz, give --fundamental {speed}; \
-             otherwise add {order} {} to --orders",
-            rounded(fundamental_hz, 7),
-            list(&|k| rounded(k * speed_hz, 5)),
-            list(&|k| rounded(k / f64::from(part), 4)),
-            speed = rounded(speed_hz, 7),
-        ),
-    )
+    WarningCode::LinesBetweenOrders.warning(format!(
+        "{lines} between the orders of {} Hz, at {} Hz: if the speed is {speed} Hz, give --fundamental {speed}; \
+         otherwise add {order} {} to --orders",
+        rounded(fundamental_hz, 7),
+        list(&|k| rounded(k * speed_hz, 5)),
+        list(&|k| rounded(k / f64::from(part), 4)),
+        speed = rounded(speed_hz, 7),
+    ))
 }

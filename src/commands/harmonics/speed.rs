@@ -10,7 +10,7 @@ use super::mains::{self, is_at_mains};
 use crate::cli::REFINE_SPAN;
 use crate::print::rounded;
 use crate::recording::UniformRecord;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Number of parts of the record whose speeds are compared.
 const PARTS: usize = 4;
@@ -89,14 +89,11 @@ pub(super) fn off(
             true => "--refine".to_owned(),
             false => format!("--refine --refine-span {}", 100.0 * span),
         };
-        Warning::new(
-            "fundamental-off",
-            format!(
-                "a fundamental of {digits} Hz fits the record better than {} Hz, at which components are too small and \
-                 their phases wrong: add {refine}, or give --fundamental {digits}",
-                rounded(fundamental_hz, 7)
-            ),
-        )
+        WarningCode::FundamentalOff.warning(format!(
+            "a fundamental of {digits} Hz fits the record better than {} Hz, at which components are too small and \
+             their phases wrong: add {refine}, or give --fundamental {digits}",
+            rounded(fundamental_hz, 7)
+        ))
     })
 }
 
@@ -145,15 +142,12 @@ pub(super) fn warning(
     let duration_s = count as f64 / record.rate_hz;
     let matters = change_hz > SIGNIFICANT * std_hz && change_hz * highest * duration_s > TURNS;
     matters.then(|| {
-        Warning::new(
-            "speed-changes",
-            format!(
-                "the fundamental changes over the record, from {} to {} Hz: the components are averages and too small, \
-                 increasingly with their order; select a part of constant speed with --range",
-                rounded(slowest.frequency_hz, 6),
-                rounded(fastest.frequency_hz, 6)
-            ),
-        )
+        WarningCode::SpeedChanges.warning(format!(
+            "the fundamental changes over the record, from {} to {} Hz: the components are averages and too small, \
+             increasingly with their order; select a part of constant speed with --range",
+            rounded(slowest.frequency_hz, 6),
+            rounded(fastest.frequency_hz, 6)
+        ))
     })
 }
 
@@ -241,16 +235,13 @@ fn sways_by(orders: &[f64], shown: &[Vec<Option<[f64; 2]>>]) -> Option<Warning> 
     let highest = there.fold(0.0, f64::max);
     (variance > SWAYS * noise && highest * sways_rad > SWAY_RAD).then(|| {
         let loss = -(-0.5 * (highest * sways_rad).powi(2)).exp_m1();
-        Warning::new(
-            "speed-changes",
-            format!(
-                "the speed is not constant: the shaft angle deviates by {} degrees rms from uniform rotation, so \
-                 components are averages and too small, order {} by about {} %; select a shorter part with --range",
-                rounded(sways_rad.to_degrees(), 2),
-                rounded(highest, 4),
-                rounded(100.0 * loss, 2)
-            ),
-        )
+        WarningCode::SpeedChanges.warning(format!(
+            "the speed is not constant: the shaft angle deviates by {} degrees rms from uniform rotation, so \
+             components are averages and too small, order {} by about {} %; select a shorter part with --range",
+            rounded(sways_rad.to_degrees(), 2),
+            rounded(highest, 4),
+            rounded(100.0 * loss, 2)
+        ))
     })
 }
 
@@ -384,15 +375,12 @@ pub(super) fn load_changes(
         });
         let duration_s = count as f64 / record.rate_hz;
         let at = at.unwrap_or(1) as f64 / PIECES as f64 * duration_s;
-        Warning::new(
-            "load-changes",
-            format!(
-                "the mean torque changes over the record by {} % of its largest value, most at about {} s after the \
-                 start: the components are averages over different loads; select a part of constant load with --range",
-                rounded(100.0 * change / largest, 2),
-                rounded(at, 2)
-            ),
-        )
+        WarningCode::LoadChanges.warning(format!(
+            "the mean torque changes over the record by {} % of its largest value, most at about {} s after the \
+             start: the components are averages over different loads; select a part of constant load with --range",
+            rounded(100.0 * change / largest, 2),
+            rounded(at, 2)
+        ))
     })
 }
 

@@ -8,7 +8,7 @@ use torqcomp_dsp::store::SampleStore;
 use super::speed::FIRST;
 use crate::print::rounded;
 use crate::recording::UniformRecord;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Part of the power of a record, without its mean, that the orders must explain.
 const EXPLAINED: f64 = 0.5;
@@ -49,16 +49,13 @@ pub(super) fn warning(
     (explained < EXPLAINED && rest > FAR * noise).then(|| {
         let largest = found.components.iter().map(|c| c.phasor.norm());
         let largest = largest.fold(0.0, f64::max);
-        Warning::new(
-            "orders-explain-little",
-            format!(
-                "the orders of {} Hz explain {percent} of the variation of the record; the residual is {} times the largest \
-                 component (rms) and is not noise: the speed changes within the range, or is another one, or other torques act. \
-                 Components may be far too small, and their uncertainties do not allow for that: select a shorter part \
-                 with --range, or give the speed there",
-                rounded(fundamental_hz, 7),
-                rounded(rest.sqrt() / largest, 2)
-            ),
-        )
+        WarningCode::OrdersExplainLittle.warning(format!(
+            "the orders of {} Hz explain {percent} of the variation of the record; the residual is {} times the largest \
+             component (rms) and is not noise: the speed changes within the range, or is another one, or other torques act. \
+             Components may be far too small, and their uncertainties do not allow for that: select a shorter part \
+             with --range, or give the speed there",
+            rounded(fundamental_hz, 7),
+            rounded(rest.sqrt() / largest, 2)
+        ))
     })
 }

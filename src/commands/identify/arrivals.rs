@@ -5,7 +5,7 @@ use torqcomp_dsp::dot;
 use crate::failure::Failure;
 use crate::identify::Identification;
 use crate::print::rounded;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Ratio of the residual of a decay at uniform times to that at its time stamps, up to which sampling was uniform.
 const CLEARLY_LESS: f64 = 0.95;
@@ -61,14 +61,11 @@ pub(super) fn warning(at_stamps: &Result<Identification, Failure>, rate_hz: f64)
         ),
         None => "no decay is found with them".to_owned(),
     };
-    Warning::new(
-        "stamps-of-arrival",
-        format!(
-            "the time stamps jitter: {left}, and equal steps of {} Hz fit clearly better. They are arrival times, so \
-             equal steps were used; give the recorder's rate with --rate HZ",
-            rounded(rate_hz, 7)
-        ),
-    )
+    WarningCode::StampsOfArrival.warning(format!(
+        "the time stamps jitter: {left}, and equal steps of {} Hz fit clearly better. They are arrival times, so \
+         equal steps were used; give the recorder's rate with --rate HZ",
+        rounded(rate_hz, 7)
+    ))
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::identify::{Identification, KnownConstant, ModalPole, NamedEstimate};
 use crate::print::{rounded, short};
 use crate::stand::update::{COMMON, CORRELATIONS, Entry};
+use crate::warning::WarningCode;
 
 /// Ratios determined by a test.
 #[derive(Clone, Copy)]
@@ -50,7 +51,7 @@ pub(super) fn from_ratios(
     };
     result.parameters.extend(found.list);
     let Some((known, is_given)) = known(anchors, findings, ratios)? else {
-        result.warn("not-anchored", ONLY_RATIOS);
+        result.warn(WarningCode::NotAnchored.warning(ONLY_RATIOS));
         let names = ["natural_frequency", "damping_ratio"];
         let modal = mode.modal_constants().of_mode((0, 1), &names);
         return Ok(entries(&modal.list, source));
@@ -73,14 +74,11 @@ pub(super) fn from_ratios(
         all.insert(0, declared);
     }
     match known.std() {
-        None => result.warn(
-            "anchor-without-std",
-            format!(
-                "the {} has no standard uncertainty, so those of the constants scaled with it are too small; declare it \
-                 as {{ value = \"…\", std = \"…\" }} in a stand file",
-                scale.name
-            ),
-        ),
+        None => result.warn(WarningCode::AnchorWithoutStd.warning(format!(
+            "the {} has no standard uncertainty, so those of the constants scaled with it are too small; declare it \
+             as {{ value = \"…\", std = \"…\" }} in a stand file",
+            scale.name
+        ))),
         // All three constants share the relative uncertainty of the known one.
         Some(std) => all.push(Entry::quantity(
             "mechanics",
@@ -143,25 +141,21 @@ pub(super) fn from_residue(
         if findings.result.output.is_some() {
             return Err(ErrorCode::NotIdentifiable.failed(text));
         }
-        result.warn("impossible", text);
+        result.warn(WarningCode::Impossible.warning(text));
         return Ok(Vec::new());
     }
     if anchors.inertia.is_some() || anchors.stiffness.is_some() {
-        result.warn(
-            "anchor-not-needed",
+        result.warn(WarningCode::AnchorNotNeeded.warning(
             "--inertia or --stiffness is not used: torque and motion determine inertia, damping and stiffness",
-        );
+        ));
     }
     if let Some(angle) = mode.residue_phase() {
-        result.warn(
-            "turned",
-            format!(
-                "the phase of the mode differs by {} degrees from J θ'' + f θ' + K θ = T, so its constants are \
-                 approximate: check for a delay (--delay), another mode close by, or a motion not measured where the \
-                 torque acts",
-                rounded(angle.to_degrees(), 2)
-            ),
-        );
+        result.warn(WarningCode::Turned.warning(format!(
+            "the phase of the mode differs by {} degrees from J θ'' + f θ' + K θ = T, so its constants are \
+             approximate: check for a delay (--delay), another mode close by, or a motion not measured where the \
+             torque acts",
+            rounded(angle.to_degrees(), 2)
+        )));
     }
     result.method.push(
         "inertia, damping and stiffness from the ratio of motion to torque, without a declared constant"

@@ -21,7 +21,7 @@ use crate::io::{Input, Reading};
 use crate::quality::{self, TimeFindings};
 use crate::recording::{AlignedChannels, Channel, Recording, check_cells, is_uniform};
 use crate::stand::update::Entry;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// A recording of decays.
 struct Loaded {
@@ -299,7 +299,7 @@ fn entries(args: &Decay, result: &mut Identification) -> Result<Vec<Entry>, Fail
 
 /// Frequency and damping of several modes, by ascending frequency, for a stand file.
 fn modes(result: &mut Identification, source: &str) -> Entry {
-    result.warn("residues-unknown", NO_RESIDUES);
+    result.warn(WarningCode::ResiduesUnknown.warning(NO_RESIDUES));
     let mut all = result.modes.clone();
     sort_by_number(&mut all, |mode| mode.pole().omega_rad_per_s);
     let entries = |mode: &ModalPole| {

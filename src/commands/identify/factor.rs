@@ -14,7 +14,7 @@ pub(super) fn factor_of(
     let wrong = || {
         ErrorCode::InvalidValue.usage(format_args!(
             "--torque-factor {text}: expected a number, a unit of torque or force, and \"/\" the unit of \
-         the channel, such as \"35.15 N/V\""
+             the channel, such as \"35.15 N/V\""
         ))
     };
     let (number, units) = text.trim().split_once(' ').ok_or_else(wrong)?;

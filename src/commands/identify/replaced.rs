@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::identify::Identification;
 use crate::print::{rounded, short};
 use crate::stand::{self, TransducerSignal, is_far_beyond_rated};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Relative difference of a new calibration from the one that it replaces, above which it is questioned: far more than the
 /// drift of a bridge.
@@ -72,7 +72,7 @@ pub(super) fn warnings(
             short(rated)
         )
     });
-    let differs = differs.map(|text| Warning::new("calibration-differs", text));
-    let beyond = beyond.map(|text| Warning::new("beyond-rated-torque", text));
+    let differs = differs.map(|text| WarningCode::CalibrationDiffers.warning(text));
+    let beyond = beyond.map(|text| WarningCode::BeyondRatedTorque.warning(text));
     Ok(differs.into_iter().chain(beyond).collect())
 }

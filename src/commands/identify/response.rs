@@ -18,6 +18,7 @@ use crate::recording::{AlignedChannels, Channel};
 use crate::stand::update::{self, Entry};
 use crate::stand::{self, TransducerSignal};
 use crate::unit::NamedUnit;
+use crate::warning::WarningCode;
 
 /// Runs the test.
 pub fn run(args: &Response) -> Result<Outcome, Failure> {
@@ -294,11 +295,10 @@ fn zero(
     let signal = unit.and_then(|unit| TransducerSignal::of(&unit.unit));
     let Some(estimate) = signal.and_then(|signal| rest::zero(loaded, signal)) else {
         if is_written {
-            result.warn(
-                "zero-unknown",
+            result.warn(WarningCode::ZeroUnknown.warning(
                 "the records do not begin at rest, so the output at no load is unknown, and the stand file takes it as \
                  0: record it without load, and give it as [recorder] zero",
-            );
+            ));
         }
         return Ok(None);
     };

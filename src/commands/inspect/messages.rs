@@ -13,7 +13,7 @@ use crate::print::plural;
 use crate::recording::moment::{Moment, date_and_time};
 use crate::recording::{AllSamples, Channel, Recording, TimeAxis, message_times};
 use crate::unit::NamedUnit;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Maximum number of samples kept of all numbers together: eight bytes each, and as many for time stamps.
 const MOST_SAMPLES: u64 = 1 << 22;
@@ -101,7 +101,7 @@ fn of_file(inventory: &Inventory) -> Content {
 /// A warning about a topic whose messages are not one signal, unless already given.
 fn mixed(topic: &ChannelReport, failure: &Failure) -> Option<Warning> {
     let is_new = topic.unreadable.is_none() && failure.code() == Some(ErrorCode::RecordsDiffer);
-    is_new.then(|| Warning::new("mcap-unreadable", failure.to_string()))
+    is_new.then(|| WarningCode::McapUnreadable.warning(failure.to_string()))
 }
 
 /// The numbers of a file and those selected for reading.
@@ -164,13 +164,10 @@ fn choice(topic: &ChannelReport, number: &LeafReport) -> FieldChoice {
 }
 
 fn not_read(left_out: usize) -> Warning {
-    Warning::new(
-        "samples-not-read",
-        format!(
-            "samples not examined: those of {}; there are too many of them, or the input can be read only once",
-            plural(left_out, "number")
-        ),
-    )
+    WarningCode::SamplesNotRead.warning(format!(
+        "samples not examined: those of {}; there are too many of them, or the input can be read only once",
+        plural(left_out, "number")
+    ))
 }
 
 /// Remaining capacity for reading.

@@ -5,7 +5,7 @@ use torqcomp_dsp::quality::sums::SampleSums;
 use super::report::InspectedChannel;
 use crate::print::plural;
 use crate::recording::{AllSamples, Channel};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Time stamps as far as kept.
 #[derive(Debug, Default)]
@@ -87,14 +87,11 @@ pub fn warning(channels: &[Channel], all: &[Option<AllSamples>]) -> Option<Warni
         .filter_map(|(kept, all)| Some((kept.samples.len(), all.as_ref()?.sums.samples)))
         .collect();
     let (kept, samples) = long.iter().max_by_key(|(_, samples)| *samples)?;
-    Some(Warning::new(
-        "first-samples-only",
-        format!(
-            "{} too long to be kept in memory: samples, duration, range, mean, rms and missing numbers are those of \
-             all samples; all other checks cover the first ones ({kept} of {samples} in the longest)",
-            plural(long.len(), "channel"),
-        ),
-    ))
+    Some(WarningCode::FirstSamplesOnly.warning(format!(
+        "{} too long to be kept in memory: samples, duration, range, mean, rms and missing numbers are those of \
+         all samples; all other checks cover the first ones ({kept} of {samples} in the longest)",
+        plural(long.len(), "channel"),
+    )))
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use super::modes::{self, ModesFit, Stretch};
 use crate::failure::Failure;
 use crate::identify::Identification;
 use crate::print::rounded;
+use crate::warning::WarningCode;
 
 /// Minimum reduction of the criterion for a law other than viscous damping.
 const CLEARLY: f64 = 10.0;
@@ -53,16 +54,13 @@ pub(super) fn damping_law(
             true => VISCOUS_PART,
             false => "",
         };
-        result.warn(
-            "not-viscous",
-            format!(
-                "{} damping fits the envelope better than viscous damping (residual {} instead of {}): no single \
-                 damping ratio describes this decay{part}",
-                best.law.name(),
-                rounded(best.rms, 3),
-                rounded(viscous.rms, 3)
-            ),
-        );
+        result.warn(WarningCode::NotViscous.warning(format!(
+            "{} damping fits the envelope better than viscous damping (residual {} instead of {}): no single \
+             damping ratio describes this decay{part}",
+            best.law.name(),
+            rounded(best.rms, 3),
+            rounded(viscous.rms, 3)
+        )));
     }
     result.laws = laws;
     Ok(())
@@ -121,13 +119,10 @@ fn compare_halves(result: &mut Identification, early: &ModesFit, late: &ModesFit
         let (first, second) = (early.fit.values[i], late.fit.values[i]);
         let change = second / first - 1.0;
         if (second - first).abs() > CHANGED * a.hypot(b) && change.abs() > NOTABLE[i] {
-            result.warn(
-                "amplitude-dependent",
-                format!(
-                    "the {what} changes by {} % from large to small amplitudes: state the amplitude with it",
-                    rounded(100.0 * change, 2)
-                ),
-            );
+            result.warn(WarningCode::AmplitudeDependent.warning(format!(
+                "the {what} changes by {} % from large to small amplitudes: state the amplitude with it",
+                rounded(100.0 * change, 2)
+            )));
         }
     }
 }

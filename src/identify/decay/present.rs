@@ -7,34 +7,28 @@ use crate::failure::{ErrorCode, Failure};
 use crate::identify::hum::{SteadyLine, listed};
 use crate::identify::{self, Identification, Pole};
 use crate::print::{plural, rounded};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Warns about reasons to doubt the fit.
 pub(super) fn fit_warnings(result: &mut Identification, fit: &ModesFit) {
     if let Some(frequency_hz) = fit.close_hz {
-        result.warn(
-            "close-lines",
-            format!(
-                "the residual has a line within 3 % of {} Hz: a second mode close by (then give --modes), or frequency \
-                 or damping that changes with amplitude or time",
-                rounded(frequency_hz, 4)
-            ),
-        );
+        result.warn(WarningCode::CloseLines.warning(format!(
+            "the residual has a line within 3 % of {} Hz: a second mode close by (then give --modes), or frequency \
+             or damping that changes with amplitude or time",
+            rounded(frequency_hz, 4)
+        )));
     }
     for (k, pole) in fit.poles.iter().enumerate() {
         if fit.fit.at_bound[2 * k] {
-            result.warn(
-                "at-bound",
-                format!(
-                    "the damping of mode {} at {} Hz is not identifiable from this record (fitted: 0)",
-                    k + 1,
-                    rounded(pole.frequency_hz(), 5)
-                ),
-            );
+            result.warn(WarningCode::AtBound.warning(format!(
+                "the damping of mode {} at {} Hz is not identifiable from this record (fitted: 0)",
+                k + 1,
+                rounded(pole.frequency_hz(), 5)
+            )));
         }
     }
     if !fit.fit.stop.converged() {
-        result.warn("not-converged", "the fit did not converge");
+        result.warn(WarningCode::NotConverged.warning("the fit did not converge"));
     }
 }
 
@@ -68,13 +62,10 @@ pub(super) fn restart(times_s: &[f64], consequence: &str) -> Option<Warning> {
         true => " and later",
         false => "",
     };
-    Some(Warning::new(
-        "restart-in-decay",
-        format!(
-            "the ringing starts again at {} s{more}: a second hit, lost samples, or the end of an overload; {consequence}",
-            named.join(", ")
-        ),
-    ))
+    Some(WarningCode::RestartInDecay.warning(format!(
+        "the ringing starts again at {} s{more}: a second hit, lost samples, or the end of an overload; {consequence}",
+        named.join(", ")
+    )))
 }
 
 /// Warnings about decays that begin anew, and what follows from each kind.
@@ -84,14 +75,11 @@ pub(super) fn beginnings(all: &[Beginning], [restarted, driven]: [&str; 2]) -> V
         of_kind.map(|b| b.time_s).collect::<Vec<_>>()
     };
     let driven = times(false).last().map(|last_s| {
-        Warning::new(
-            "driven-at-first",
-            format!(
-                "up to {} s the motion is not the free decay that follows, but driven (by a soft push, a hand, or a load that \
-                 is let go slowly); {driven}",
-                rounded(*last_s, 5)
-            ),
-        )
+        WarningCode::DrivenAtFirst.warning(format!(
+            "up to {} s the motion is not the free decay that follows, but driven (by a soft push, a hand, or a load that \
+             is let go slowly); {driven}",
+            rounded(*last_s, 5)
+        ))
     });
     restart(&times(true), restarted)
         .into_iter()
@@ -123,15 +111,12 @@ pub(super) fn apart(result: &mut Identification, fit: &ModesFit, stretches: usiz
         .clone()
         .flat_map(|k| modes.clone().map(move |l| (k, l)));
     if let Some((k, l)) = pairs.find(|pair| pair.0 < pair.1 && is_apart(pair)) {
-        result.warn(
-            "decays-apart",
-            format!(
-                "some decays ring at {} Hz and others at {} Hz, none at both: the stand was changed between them, or \
-                 they are of different stands; identify them one by one",
-                rounded(hz(k), 5),
-                rounded(hz(l), 5)
-            ),
-        );
+        result.warn(WarningCode::DecaysApart.warning(format!(
+            "some decays ring at {} Hz and others at {} Hz, none at both: the stand was changed between them, or \
+             they are of different stands; identify them one by one",
+            rounded(hz(k), 5),
+            rounded(hz(l), 5)
+        )));
     }
 }
 
@@ -145,15 +130,12 @@ pub(super) fn crowded(result: &mut Identification, fit: &ModesFit, main: usize) 
     let is_near = |pole: &&Pole| (pole.frequency_hz() / hz - 1.0).abs() < distance;
     let others = fit.poles.iter().filter(is_near).count() - 1;
     if others >= least {
-        result.warn(
-            "crowded-modes",
-            format!(
-                "{others} modes lie within {} % of the strongest one at {} Hz: a single mode that is stopped by dry friction \
-                 looks like this where another mode rings beside it; filter that out with the upper end of --band",
-                rounded(100.0 * distance, 2),
-                rounded(hz, 5)
-            ),
-        );
+        result.warn(WarningCode::CrowdedModes.warning(format!(
+            "{others} modes lie within {} % of the strongest one at {} Hz: a single mode that is stopped by dry friction \
+             looks like this where another mode rings beside it; filter that out with the upper end of --band",
+            rounded(100.0 * distance, 2),
+            rounded(hz, 5)
+        )));
     }
 }
 
@@ -185,25 +167,19 @@ pub(super) fn poor(
         FALLING
     };
     if relative > POOR {
-        result.warn(
-            "poor-fit",
-            format!(
-                "the residual is {} % of the decay: this is hardly free ringing; select a part where nothing drives \
-                 the stand with --range, or choose another --channel",
-                rounded(100.0 * relative, 2)
-            ),
-        );
+        result.warn(WarningCode::PoorFit.warning(format!(
+            "the residual is {} % of the decay: this is hardly free ringing; select a part where nothing drives \
+             the stand with --range, or choose another --channel",
+            rounded(100.0 * relative, 2)
+        )));
     } else if relative > least.0 && falls > least.1 && !is_told {
-        result.warn(
-            "poor-fit",
-            format!(
-                "the residual, {} % of the decay, is {} times as large while the stand rings as afterwards: it is not \
-                 noise, but something else set off by the hit (an amplifier that is AC coupled or near its limit, a \
-                 part that rattles), and frequency and damping are less certain than their std says",
-                rounded(100.0 * relative, 2),
-                rounded(falls, 2)
-            ),
-        );
+        result.warn(WarningCode::PoorFit.warning(format!(
+            "the residual, {} % of the decay, is {} times as large while the stand rings as afterwards: it is not \
+             noise, but something else set off by the hit (an amplifier that is AC coupled or near its limit, a \
+             part that rattles), and frequency and damping are less certain than their std says",
+            rounded(100.0 * relative, 2),
+            rounded(falls, 2)
+        )));
     }
 }
 

@@ -16,6 +16,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::identify::Identification;
 use crate::identify::hum::{SteadyLine, without_mains};
 use crate::print::{plural, short};
+use crate::warning::WarningCode;
 
 /// Maximum number of fitted samples, over all segments.
 const MOST_SAMPLES: usize = 20_000;
@@ -269,10 +270,9 @@ impl Cuts {
             }));
         }
         if found > MOST_STRETCHES {
-            result.warn(
-                "decays-left-out",
-                format!("only the first {MOST_STRETCHES} of {found} decays are used"),
-            );
+            result.warn(WarningCode::DecaysLeftOut.warning(format!(
+                "only the first {MOST_STRETCHES} of {found} decays are used"
+            )));
         }
         Ok(())
     }
@@ -325,14 +325,11 @@ fn parts(values: &[f64], rings: &Range<usize>, is_uniform: bool) -> Vec<Range<us
 fn clipped_times(record: &Ringing, result: &mut Identification) -> Vec<f64> {
     let of_amplifier = || {
         let found = flat_tops(record.values)?;
-        result.warn(
-            "clipped",
-            format!(
-                "{}: the first peaks of the decay are flat, as from an amplifier overdriven before its filter: the \
-                 decay is fitted after them; tap more gently, or use a smaller gain",
-                record.name
-            ),
-        );
+        result.warn(WarningCode::Clipped.warning(format!(
+            "{}: the first peaks of the decay are flat, as from an amplifier overdriven before its filter: the \
+             decay is fitted after them; tap more gently, or use a smaller gain",
+            record.name
+        )));
         Some(found)
     };
     let Some(found) = Clipping::of(record.values).or_else(of_amplifier) else {

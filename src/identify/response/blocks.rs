@@ -12,6 +12,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::identify::hum::{self, without_mains};
 use crate::identify::{Identification, rms};
 use crate::print::{plural, rounded, short};
+use crate::warning::WarningCode;
 
 /// Blocks of all records, on a common frequency grid.
 pub(super) struct Set {
@@ -272,7 +273,7 @@ fn good_hits(
             if hit.faults.is_empty() {
                 left = left.max(hit.left);
                 if let Some(part) = hit.second {
-                    result.warn("second-stroke", second_stroke(record, k, part));
+                    result.warn(WarningCode::SecondStroke.warning(second_stroke(record, k, part)));
                 }
                 good.push((r, hit.range));
                 continue;
@@ -297,7 +298,7 @@ fn good_hits(
     }
     check::overlapping_hits(result, left);
     for message in bad {
-        result.warn("hit-left-out", message);
+        result.warn(WarningCode::HitLeftOut.warning(message));
     }
     Ok(good)
 }
@@ -428,13 +429,10 @@ fn report_noise(result: &mut Identification, name: &str, found: &frf::Periodic) 
         }
     ));
     if others > 4.0 * noise && others > 1e-4 * signal {
-        result.warn(
-            "nonlinear",
-            format!(
-                "{name}: at frequencies that were not excited the response has more power than noise explains ({} dB): \
-                 the stand is nonlinear at this level",
-                decibel(others)
-            ),
-        );
+        result.warn(WarningCode::Nonlinear.warning(format!(
+            "{name}: at frequencies that were not excited the response has more power than noise explains ({} dB): \
+             the stand is nonlinear at this level",
+            decibel(others)
+        )));
     }
 }

@@ -6,6 +6,7 @@ use super::{FinalFit, Modal};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::Identification;
 use crate::print::{plural, rounded, short};
+use crate::warning::WarningCode;
 use torqcomp_dsp::frf::{Estimator, Window};
 
 /// Rejects records that differ in rate, have gaps, or are constant.
@@ -93,16 +94,13 @@ pub(super) fn leakage(result: &mut Identification, set: &Set, fitted: &Modal) {
     for pole in &fitted.poles {
         let wider = (std::f64::consts::TAU / (pole.rate_per_s * length_s)).powi(2) / 3.0;
         if wider > WIDER && pole.rate_per_s > 0.0 {
-            result.warn(
-                "leakage",
-                format!(
-                    "the mode at {} Hz is narrow for segments of {} s: its damping is about {} % too large, which its \
-                     uncertainty does not include; choose a longer --segment",
-                    rounded(pole.frequency_hz(), 5),
-                    short(length_s),
-                    rounded(100.0 * wider, 1)
-                ),
-            );
+            result.warn(WarningCode::Leakage.warning(format!(
+                "the mode at {} Hz is narrow for segments of {} s: its damping is about {} % too large, which its \
+                 uncertainty does not include; choose a longer --segment",
+                rounded(pole.frequency_hz(), 5),
+                short(length_s),
+                rounded(100.0 * wider, 1)
+            )));
         }
     }
 }
@@ -113,18 +111,15 @@ pub(super) const POOR: f64 = 0.3;
 /// Warns about reasons to doubt the fit.
 pub(super) fn doubts(result: &mut Identification, found: &FinalFit, leads: bool) {
     if leads {
-        result.warn("leads", LEADS);
+        result.warn(WarningCode::Leads.warning(LEADS));
     }
     if found.relative > POOR {
-        result.warn(
-            "poor-fit",
-            format!(
-                "the residual of {} is {} % of the measured signal: there are more modes, or the applied signal does \
-                 not explain it; omit or raise --modes, check the coherence (--html), and choose another --band",
-                plural(found.modal.poles.len(), "mode"),
-                rounded(100.0 * found.relative, 2)
-            ),
-        );
+        result.warn(WarningCode::PoorFit.warning(format!(
+            "the residual of {} is {} % of the measured signal: there are more modes, or the applied signal does \
+             not explain it; omit or raise --modes, check the coherence (--html), and choose another --band",
+            plural(found.modal.poles.len(), "mode"),
+            rounded(100.0 * found.relative, 2)
+        )));
     }
     noise_before_resonance(result, found.gain_error);
 }
@@ -140,15 +135,12 @@ const OF_GAIN: f64 = 1.0 / 3.0;
 /// spectrum.
 pub(super) fn short_pulses(result: &mut Identification, part: f64) {
     if part > FOLDED {
-        result.warn(
-            "short-pulse",
-            format!(
-                "the hammer pulses last only a few samples, so frequencies above half the rate alias into their \
-                 spectrum: gains may be wrong by about {} %, which their uncertainties do not include, unless the \
-                 recorder has an anti-aliasing filter; record at a higher rate, or use a softer tip",
-                rounded(100.0 * OF_GAIN * part, 1)
-            ),
-        );
+        result.warn(WarningCode::ShortPulse.warning(format!(
+            "the hammer pulses last only a few samples, so frequencies above half the rate alias into their \
+             spectrum: gains may be wrong by about {} %, which their uncertainties do not include, unless the \
+             recorder has an anti-aliasing filter; record at a higher rate, or use a softer tip",
+            rounded(100.0 * OF_GAIN * part, 1)
+        )));
     }
 }
 
@@ -158,15 +150,12 @@ const OVERLAPS: f64 = 0.01;
 /// Warns about hits that follow before the response to the previous one has decayed.
 pub(super) fn overlapping_hits(result: &mut Identification, left: f64) {
     if left > OVERLAPS {
-        result.warn(
-            "hits-overlap",
-            format!(
-                "a response still rings at {} % of its maximum when the next hit follows, which then counts as an effect of \
-                 that hit: constants, and static gain most of all, may be wrong by about as much; wait longer between hits, \
-                 or give --excitation transient with --modes, which evaluates all hits of a record together",
-                rounded(100.0 * left, 2)
-            ),
-        );
+        result.warn(WarningCode::HitsOverlap.warning(format!(
+            "a response still rings at {} % of its maximum when the next hit follows, which then counts as an effect of \
+             that hit: constants, and static gain most of all, may be wrong by about as much; wait longer between hits, \
+             or give --excitation transient with --modes, which evaluates all hits of a record together",
+            rounded(100.0 * left, 2)
+        )));
     }
 }
 
@@ -176,29 +165,23 @@ const GAIN_ERROR: f64 = 1e-3;
 /// Warns about noise on the force of hits that could not be separated from what follows the stroke.
 pub(super) fn noise_on_force(result: &mut Identification, part: f64) {
     if part > GAIN_ERROR {
-        result.warn(
-            "noise-on-force",
-            format!(
-                "a slow signal follows the hammer strokes (AC coupling, a drifting zero), so the noise outside them \
-                 cannot be subtracted: the response is about {} % too small, which its uncertainties do not include; \
-                 use DC coupling for the hammer, or reduce its noise",
-                rounded(100.0 * part, 2)
-            ),
-        );
+        result.warn(WarningCode::NoiseOnForce.warning(format!(
+            "a slow signal follows the hammer strokes (AC coupling, a drifting zero), so the noise outside them \
+             cannot be subtracted: the response is about {} % too small, which its uncertainties do not include; \
+             use DC coupling for the hammer, or reduce its noise",
+            rounded(100.0 * part, 2)
+        )));
     }
 }
 
 /// Warns about noise that enters before the resonance.
 fn noise_before_resonance(result: &mut Identification, gain_error: f64) {
     if gain_error > GAIN_ERROR {
-        result.warn(
-            "noise-before-resonance",
-            format!(
-                "the residual follows the resonance: something else drives the stand, or the applied signal is noisy, \
-                 which makes the gain up to {} % too small (and J, f and K as much too large); their uncertainties \
-                 allow for it; reduce the noise of --applied or excite more",
-                rounded(100.0 * gain_error, 2)
-            ),
-        );
+        result.warn(WarningCode::NoiseBeforeResonance.warning(format!(
+            "the residual follows the resonance: something else drives the stand, or the applied signal is noisy, \
+             which makes the gain up to {} % too small (and J, f and K as much too large); their uncertainties \
+             allow for it; reduce the noise of --applied or excite more",
+            rounded(100.0 * gain_error, 2)
+        )));
     }
 }

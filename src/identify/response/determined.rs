@@ -7,6 +7,7 @@ use super::{Data, Effort, FinalFit, Modal, foreign};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::{Identification, Pole};
 use crate::print::rounded;
+use crate::warning::WarningCode;
 
 /// The fit with the modes that are determined: within reach, and for a stand file (`is_grounded`) damped.
 ///
@@ -70,15 +71,12 @@ fn reached(
     if left_out.is_empty() {
         return Ok(coarse);
     }
-    result.warn(
-        "mode-out-of-reach",
-        format!(
-            "the fit had modes at {} Hz, above the fitted lines, which end at {} Hz and do not determine them: they are \
-             dropped; excite higher frequencies, or choose fewer --modes",
-            left_out.join(", "),
-            rounded(highest / TAU, 3)
-        ),
-    );
+    result.warn(WarningCode::ModeOutOfReach.warning(format!(
+        "the fit had modes at {} Hz, above the fitted lines, which end at {} Hz and do not determine them: they are \
+         dropped; excite higher frequencies, or choose fewer --modes",
+        left_out.join(", "),
+        rounded(highest / TAU, 3)
+    )));
     Ok(kept)
 }
 

@@ -14,6 +14,7 @@ use super::modal::{ABOVE, Modal};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::{Identification, Pole, overtone};
 use crate::print::rounded;
+use crate::warning::WarningCode;
 
 /// Damping ratio above which a mode far below the others does not ring.
 const RINGS: f64 = 0.3;
@@ -158,26 +159,20 @@ pub(super) fn warn(
     };
     let drift = of_kind(Foreign::Drift);
     if !drift.is_empty() {
-        result.warn(
-            "ac-coupled-or-drift",
-            format!(
-                "the fit needs a slow component, at {} Hz: a channel drifts or is AC coupled; it is excluded from the \
-                 modes and from the static gain, which then rests on the modes alone; record both channels with DC \
-                 coupling, or check the static gain with a weight",
-                drift.join(", ")
-            ),
-        );
+        result.warn(WarningCode::AcCoupledOrDrift.warning(format!(
+            "the fit needs a slow component, at {} Hz: a channel drifts or is AC coupled; it is excluded from the \
+             modes and from the static gain, which then rests on the modes alone; record both channels with DC \
+             coupling, or check the static gain with a weight",
+            drift.join(", ")
+        )));
     }
     let beyond = of_kind(Foreign::OutOfReach);
     if !beyond.is_empty() {
-        result.warn(
-            "mode-out-of-reach",
-            format!(
-                "the fit has a mode at {} Hz, above all frequencies of the records: it is dropped, and the static gain \
-                 is not determined; narrow the --band, or choose fewer --modes",
-                beyond.join(", ")
-            ),
-        );
+        result.warn(WarningCode::ModeOutOfReach.warning(format!(
+            "the fit has a mode at {} Hz, above all frequencies of the records: it is dropped, and the static gain \
+             is not determined; narrow the --band, or choose fewer --modes",
+            beyond.join(", ")
+        )));
     }
     undamped(result, &of_kind(Foreign::Steady));
     Ok(())
@@ -186,15 +181,12 @@ pub(super) fn warn(
 /// Warns about modes without damping, by their frequencies.
 pub(super) fn undamped(result: &mut Identification, frequencies_hz: &[String]) {
     if !frequencies_hz.is_empty() {
-        result.warn(
-            "undamped-left-out",
-            format!(
-                "the modes at {} Hz have no measurable damping in these data and are dropped: a steady tone (mains, a \
-                 fan), noise or a nonlinear stand causes such modes; switch off the source, choose fewer --modes, or \
-                 record at one level and for longer",
-                frequencies_hz.join(", ")
-            ),
-        );
+        result.warn(WarningCode::UndampedLeftOut.warning(format!(
+            "the modes at {} Hz have no measurable damping in these data and are dropped: a steady tone (mains, a \
+             fan), noise or a nonlinear stand causes such modes; switch off the source, choose fewer --modes, or \
+             record at one level and for longer",
+            frequencies_hz.join(", ")
+        )));
     }
 }
 

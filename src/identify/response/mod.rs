@@ -27,6 +27,7 @@ use torqcomp_model::Covariance;
 use super::mode::all_or_none;
 use super::{Identification, ModalPole};
 use crate::failure::{ErrorCode, Failure};
+use crate::warning::WarningCode;
 use blocks::Set;
 pub use modal::Lag;
 use modal::{Data, Effort, Modal};
@@ -277,7 +278,7 @@ fn final_fit(
     check::leakage(result, set, &modal);
     let searched = modal.fit.as_ref().map_or(0, |fit| fit.values.len());
     if scatter::is_of_force(set, data, &modal) {
-        result.warn("one-hit", ONE_HIT);
+        result.warn(WarningCode::OneHit.warning(ONE_HIT));
     }
     let all = scatter::of_all(set, data, &modal)?;
     let of_poles = scatter::of_poles(set, data, &modal)?;

@@ -75,7 +75,7 @@ pub(super) fn order(
         let (from, to) = lines::strongest(set, &set.band);
         return Err(ErrorCode::TooManySamples.failed(format_args!(
             "{} lines in the band, more than {MOST_LINES}; narrow it to where the response is strongest: \
-         --band {}..{}",
+             --band {}..{}",
             set.band.len(),
             rounded(from as f64 * set.step_hz, 4),
             rounded(to as f64 * set.step_hz, 4)

@@ -9,6 +9,7 @@ use super::{FinalFit, Lag, Modal, ResponseOptions, foreign, shift};
 use crate::chart::{Chart, Series};
 use crate::identify::{Comparison, FitQuality, Identification, NamedEstimate};
 use crate::print::{plural, relative, rounded, short};
+use crate::warning::WarningCode;
 
 /// Adds natural frequency and damping ratio of every mode of the stand, in ascending order of
 /// frequency.
@@ -20,13 +21,10 @@ pub(super) fn add_modes(result: &mut Identification, fitted: &FinalFit) {
         let names = ["natural_frequency", "damping_ratio"];
         let constants = mode.modal_constants().of_mode((place, order.len()), &names);
         if modal.fit.as_ref().is_some_and(|f| f.at_bound[2 * k]) {
-            result.warn(
-                "at-bound",
-                format!(
-                    "the damping of the mode at {} Hz is not identifiable from these data (fitted: 0)",
-                    rounded(constants.list[0].value(), 5)
-                ),
-            );
+            result.warn(WarningCode::AtBound.warning(format!(
+                "the damping of the mode at {} Hz is not identifiable from these data (fitted: 0)",
+                rounded(constants.list[0].value(), 5)
+            )));
         }
         result.add(constants);
         result.modes.push(mode);
@@ -192,15 +190,12 @@ fn levels(result: &mut Identification, set: &Set) {
         }
         let change = (change / all).sqrt();
         if change > DIFFERENT {
-            result.warn(
-                "level-dependent",
-                format!(
-                    "at {} times the level of the first record the response differs by {} %: the stand is nonlinear, or \
-                     the noise is large",
-                    rounded(ratio, 3),
-                    rounded(100.0 * change, 2)
-                ),
-            );
+            result.warn(WarningCode::LevelDependent.warning(format!(
+                "at {} times the level of the first record the response differs by {} %: the stand is nonlinear, or \
+                 the noise is large",
+                rounded(ratio, 3),
+                rounded(100.0 * change, 2)
+            )));
         }
     }
 }

@@ -12,6 +12,7 @@ use super::{Data, Effort, FinalFit, Lag, Modal, ResponseOptions, scatter};
 use crate::failure::Failure;
 use crate::identify::Identification;
 use crate::print::rounded;
+use crate::warning::WarningCode;
 
 /// Maximum number of modes tried together with a delay.
 const MOST_MODES: usize = 3;
@@ -298,14 +299,11 @@ pub(super) fn warn(result: &mut Identification, modal: &Modal, asked: Option<Lag
         _ if modal.delay_s == 0.0 => {}
         Lag::Delay if asked == Some(Lag::Delay) => {}
         Lag::Delay => shifted(result, modal.delay_s),
-        Lag::LowPass => result.warn(
-            "low-pass-fitted",
-            format!(
-                "the measured channel lags as behind an RC low-pass of {} Hz, which was fitted and explains more than a \
-                 delay; check the filter of the amplifier, or record both channels with the same filters",
-                rounded(low_pass_hz(modal.delay_s), 3)
-            ),
-        ),
+        Lag::LowPass => result.warn(WarningCode::LowPassFitted.warning(format!(
+            "the measured channel lags as behind an RC low-pass of {} Hz, which was fitted and explains more than a \
+             delay; check the filter of the amplifier, or record both channels with the same filters",
+            rounded(low_pass_hz(modal.delay_s), 3)
+        ))),
     }
 }
 
@@ -326,15 +324,12 @@ pub(super) fn shifted(result: &mut Identification, delay_s: f64) {
     let falls = result
         .get("natural_frequency")
         .map(|hz| averaged(hz.value(), delay_s.abs()));
-    result.warn(
-        "channels-shifted",
-        format!(
-            "the {which} channel lags the other by about {} ms: a delay was fitted, as with --delay, which explains \
-             more than modes alone; check that one recorder takes both channels, with the same filters{or}{}",
-            rounded(1e3 * delay_s.abs(), 3),
-            falls.unwrap_or_default()
-        ),
-    );
+    result.warn(WarningCode::ChannelsShifted.warning(format!(
+        "the {which} channel lags the other by about {} ms: a delay was fitted, as with --delay, which explains \
+         more than modes alone; check that one recorder takes both channels, with the same filters{or}{}",
+        rounded(1e3 * delay_s.abs(), 3),
+        falls.unwrap_or_default()
+    )));
 }
 
 /// Note on a channel that is late because it averages, over twice its delay: a sine of frequency `f` is reduced to

@@ -8,6 +8,7 @@ use super::{COLOURED, FreeRun, POOR, RunupOptions};
 use crate::chart::{Chart, Series};
 use crate::identify::{Identification, Motion};
 use crate::print::{rounded, short};
+use crate::warning::WarningCode;
 
 /// Noise power in a measured term, relative to its total, above which a warning is given.
 const NOISY: f64 = 0.2;
@@ -103,38 +104,32 @@ pub(super) fn warnings(
     fitted: &FittedRows,
 ) {
     if run.kind == Motion::Acceleration {
-        result.warn(
-            "speed-unknown",
+        result.warn(WarningCode::SpeedUnknown.warning(
             "an acceleration gives the speed only up to a constant: dry friction counts as viscous friction, which is \
              too large then, and the offset includes a part of both; record position or speed to separate them",
-        );
+        ));
     } else if !directions.both() {
-        result.warn(
-            "one-direction",
+        result.warn(WarningCode::OneDirection.warning(
             "the body moves in one direction only, so dry friction and offset cannot be separated; run it in both \
              directions",
-        );
+        ));
     }
     if options.by_direction && directions.both() {
-        result.warn(
-            "dry-friction-by-direction",
+        result.warn(WarningCode::DryFrictionByDirection.warning(
             "dry friction that differs by direction cannot be distinguished from a torque offset: if the torque has no \
              offset, dry_friction ± offset is the dry friction in each direction",
-        );
+        ));
     }
     if let Some(message) = few_samples {
-        result.warn("few-samples-per-swing", message);
+        result.warn(WarningCode::FewSamplesPerSwing.warning(message));
     }
     coarse(result, run, directions, fitted);
     if fitted.fit.noise_share > NOISY {
-        result.warn(
-            "noisy-motion",
-            format!(
-                "up to {} % of the power of a measured term (acceleration or speed) is noise; the resulting bias was \
-                 removed, but a longer --window or a better sensor is safer",
-                rounded(100.0 * fitted.fit.noise_share, 2)
-            ),
-        );
+        result.warn(WarningCode::NoisyMotion.warning(format!(
+            "up to {} % of the power of a measured term (acceleration or speed) is noise; the resulting bias was \
+             removed, but a longer --window or a better sensor is safer",
+            rounded(100.0 * fitted.fit.noise_share, 2)
+        )));
     }
     let found = fitted.missing();
     impossible(result, found.is_some());
@@ -157,28 +152,25 @@ fn coarse(
     let time_s = |samples: usize| short(samples as f64 / run.rate_hz);
     let (code, why, remedy) = if few.is_held {
         (
-            "repeated-samples",
+            WarningCode::RepeatedSamples,
             "they are held",
             "record at the rate of their source",
         )
     } else {
         (
-            "coarse-quantisation",
+            WarningCode::CoarseQuantisation,
             "of its coarse resolution",
             "record with a finer resolution",
         )
     };
-    result.warn(
-        code,
-        format!(
-            "most values of the {} stay for {} s because {why}, too long for windows of ±{} s: their errors do not \
-             average out, and the constants may be wrong by more than their uncertainty; {remedy}, or for longer with a \
-             longer --window",
-            few.channel,
-            time_s(few.every),
-            time_s(fitted.rows.half)
-        ),
-    );
+    result.warn(code.warning(format!(
+        "most values of the {} stay for {} s because {why}, too long for windows of ±{} s: their errors do not \
+         average out, and the constants may be wrong by more than their uncertainty; {remedy}, or for longer with a \
+         longer --window",
+        few.channel,
+        time_s(few.every),
+        time_s(fitted.rows.half)
+    )));
 }
 
 /// Warns about a term that the equation lacks, with the constants fitted together with it.
@@ -206,7 +198,7 @@ fn missing(result: &mut Identification, run: &FreeRun, found: &Missing) {
                 which[1],
                 with(term)
             );
-            ("channels-shifted", message)
+            (WarningCode::ChannelsShifted, message)
         }
         Missing::Drag(term) => {
             let message = format!(
@@ -217,10 +209,10 @@ fn missing(result: &mut Identification, run: &FreeRun, found: &Missing) {
                 run.body.drag(),
                 with(term)
             );
-            ("drag", message)
+            (WarningCode::Drag, message)
         }
     };
-    result.warn(code, message);
+    result.warn(code.warning(message));
 }
 
 /// Warns if the motion does not explain the torque.
@@ -229,15 +221,12 @@ fn poor(result: &mut Identification) {
         return;
     };
     if relative > POOR {
-        result.warn(
-            "poor-fit",
-            format!(
-                "the residual is {} % of the torque: the motion does not explain it; check the channels (a speed with \
-                 its sign, an angle that does not wrap at full turns, the torque on the same shaft) and that neither \
-                 is clipped, and select the part where the drive runs with --range",
-                rounded(100.0 * relative, 2)
-            ),
-        );
+        result.warn(WarningCode::PoorFit.warning(format!(
+            "the residual is {} % of the torque: the motion does not explain it; check the channels (a speed with \
+             its sign, an angle that does not wrap at full turns, the torque on the same shaft) and that neither \
+             is clipped, and select the part where the drive runs with --range",
+            rounded(100.0 * relative, 2)
+        )));
     }
 }
 
@@ -255,6 +244,6 @@ fn impossible(result: &mut Identification, lacks_term: bool) {
             false => "check the signs of both channels and whether something else drives the body",
         };
         let message = format!("negative: {}; {why}", impossible.join(", "));
-        result.warn("impossible", message);
+        result.warn(WarningCode::Impossible.warning(message));
     }
 }

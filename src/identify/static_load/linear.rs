@@ -10,6 +10,7 @@ use super::{NONE, Point, SAME, value_of};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::{Identification, rms};
 use crate::print::rounded;
+use crate::warning::WarningCode;
 use torqcomp_dsp::sort_by_number;
 
 /// Distance of a mean from the curve, relative to what their scatter explains and to the deflection at the largest
@@ -133,17 +134,14 @@ pub(super) fn warn(
             use --degree 3 if it is a smooth curve"
             .to_owned(),
     };
-    result.warn(
-        "not-linear",
-        format!(
-            "a mean reading deviates from the curve by {} % of the deflection, {} what its scatter explains: {why}",
-            rounded(100.0 * off / deflection, 2),
-            match expected > 0.0 {
-                true => format!("{} times", rounded(off / expected, 2)),
-                false => "more than".to_owned(),
-            }
-        ),
-    );
+    result.warn(WarningCode::NotLinear.warning(format!(
+        "a mean reading deviates from the curve by {} % of the deflection, {} what its scatter explains: {why}",
+        rounded(100.0 * off / deflection, 2),
+        match expected > 0.0 {
+            true => format!("{} times", rounded(off / expected, 2)),
+            false => "more than".to_owned(),
+        }
+    )));
 }
 
 /// The load above which the reading hardly rises, if it saturates; `means` are those of the residual.

@@ -24,6 +24,7 @@ use super::{FitQuality, Identification, NamedEstimate, rms};
 use crate::chart::{Chart, Series};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::{plural, rounded};
+use crate::warning::WarningCode;
 use mixed::LoadCurve;
 use plateaus::{PlateauLoads, PlateauReadings};
 use ramp::RampReadings;
@@ -225,14 +226,11 @@ const CONTRADICTED: (f64, f64) = (0.1, 3.0);
 fn contradicted(result: &mut Identification, fit: &LoadCurve) {
     let doubtful = |ratio: &f64| *ratio < CONTRADICTED.0 || *ratio > CONTRADICTED.1;
     if let Some(ratio) = fit.scatter_over_known.filter(doubtful) {
-        result.warn(
-            "std-contradicted",
-            format!(
-                "the readings scatter by {} times the standard uncertainties of --std: check their unit, which is that \
-                 of the readings unless the heading names another, or omit --std",
-                rounded(ratio, 2)
-            ),
-        );
+        result.warn(WarningCode::StdContradicted.warning(format!(
+            "the readings scatter by {} times the standard uncertainties of --std: check their unit, which is that \
+             of the readings unless the heading names another, or omit --std",
+            rounded(ratio, 2)
+        )));
     }
 }
 
@@ -268,7 +266,7 @@ fn follows(
     };
     Err(ErrorCode::NotIdentifiable.failed(format_args!(
         "the reading does not follow the load: the sensitivity differs from zero by less than {FOLLOWS} standard \
-     uncertainties; {why}"
+         uncertainties; {why}"
     )))
 }
 
@@ -436,35 +434,31 @@ fn warnings(
 ) {
     if points.iter().all(|p| p.series == 0) {
         let has_empty = points.iter().any(|p| p.load.abs() <= NONE * steps.largest);
-        result.warn(
-            "one-series",
-            match has_empty {
+        result.warn(WarningCode::OneSeries.warning(match has_empty {
                 true => "the loads were applied only once: repeatability is unknown",
                 false => {
                     "no row without load separates the series of loads: repeatability is unknown; add the readings \
                      without load, or a column that numbers the series (--series)"
                 }
             },
-        );
+        ));
     }
     if steps.is_rising.iter().all(|is_rising| *is_rising) {
         result.warn(
-            "no-unloading",
-            "no readings were taken during unloading: hysteresis is unknown",
+            WarningCode::NoUnloading
+                .warning("no readings were taken during unloading: hysteresis is unknown"),
         );
     }
     if degree > 1 {
-        result.warn(
-            "curve",
+        result.warn(WarningCode::Curve.warning(
             "the constants are the slope of the curve at no load; for large loads use the curve",
-        );
+        ));
     }
     if is_one_weight {
-        result.warn(
-            "one-weight",
+        result.warn(WarningCode::OneWeight.warning(
             "a single load besides zero does not reveal a nonlinear characteristic; apply further loads, or stay near \
              this one",
-        );
+        ));
     }
 }
 

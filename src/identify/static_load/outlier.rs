@@ -5,6 +5,7 @@ use super::ramp::line;
 use super::{LoadUnits, Point, value_of};
 use crate::identify::{Identification, rms};
 use crate::print::{self, rounded};
+use crate::warning::WarningCode;
 
 /// Minimum number of points.
 const LEAST: usize = 6;
@@ -18,15 +19,12 @@ const POOR: f64 = 0.05;
 
 fn poor(result: &mut Identification, relative: f64) {
     if relative > POOR {
-        result.warn(
-            "poor-fit",
-            format!(
-                "the residual is {} of the range of the readings: check the columns, the load and reading of each row, and \
-                 that the rows are in the order in which they were taken; --degree 3 helps only if the readings follow a \
-                 smooth curve (--html)",
-                print::relative(relative, 2)
-            ),
-        );
+        result.warn(WarningCode::PoorFit.warning(format!(
+            "the residual is {} of the range of the readings: check the columns, the load and reading of each row, and \
+             that the rows are in the order in which they were taken; --degree 3 helps only if the readings follow a \
+             smooth curve (--html)",
+            print::relative(relative, 2)
+        )));
     }
 }
 
@@ -39,7 +37,9 @@ pub(super) fn warn(
     units: &LoadUnits,
 ) {
     match off_line(points, of_rows, units) {
-        Some(off) => result.warn("row-off-line", format!("{off}; the constants include it")),
+        Some(off) => {
+            result.warn(WarningCode::RowOffLine.warning(format!("{off}; the constants include it")))
+        }
         None => poor(result, relative),
     }
 }

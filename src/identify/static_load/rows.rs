@@ -3,6 +3,7 @@
 use super::Point;
 use super::steps::is_same_load;
 use crate::identify::Identification;
+use crate::warning::WarningCode;
 
 /// Minimum number of loads of a sorted table, and of rows beyond one per load.
 const SORTED: (usize, usize) = (3, 6);
@@ -27,11 +28,10 @@ pub(super) fn is_sorted(points: &[Point]) -> bool {
 
 /// Warns about sorted rows.
 pub(super) fn warn_sorted(result: &mut Identification) {
-    result.warn(
-        "rows-sorted",
+    result.warn(WarningCode::RowsSorted.warning(
         "the rows are sorted by load and reading, so the order in which they were taken is lost: drift of the zero, \
          hysteresis and repeatability are unknown; restore the order",
-    );
+    ));
 }
 
 /// Consecutive points at one load.

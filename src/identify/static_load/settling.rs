@@ -15,6 +15,7 @@ use super::steps::is_same_load;
 use super::{Point, rows};
 use crate::identify::Identification;
 use crate::print::{plural, relative, rounded};
+use crate::warning::WarningCode;
 use torqcomp_dsp::quality::median;
 
 /// Minimum number of rows at a load for its settling to be fitted, and minimum fraction of rows at such loads.
@@ -168,30 +169,24 @@ impl SettledReadings {
     /// [`Self::widen`].
     pub fn warn(&self, result: &mut Identification, shared: f64) {
         let rows = rounded(self.time_constant, 2);
-        result.warn(
-            "unsettled-left-out",
-            format!(
-                "the reading settles after each change of the load, with a time constant of {rows} rows: {} {} not settled, \
-                 and each load counts once, with the value to which its rows settle; let the reading settle before it \
-                 is taken",
-                plural(self.unsettled, "row"),
-                if self.unsettled == 1 { "is" } else { "are" }
-            ),
-        );
+        result.warn(WarningCode::UnsettledLeftOut.warning(format!(
+            "the reading settles after each change of the load, with a time constant of {rows} rows: {} {} not settled, \
+             and each load counts once, with the value to which its rows settle; let the reading settle before it \
+             is taken",
+            plural(self.unsettled, "row"),
+            if self.unsettled == 1 { "is" } else { "are" }
+        )));
         if self.missing > MISSING || (!self.is_exponential && shared > APART) {
             let enough = (self.time_constant * (1.0 / APART).ln()).ceil();
-            result.warn(
-                "still-settling",
-                format!(
-                    "the reading was still settling when the load was changed, {} of a change was missing: the settled \
-                     values are extrapolated{}; keep each load for {enough} rows or more",
-                    relative(self.missing, 2),
-                    match self.is_exponential {
-                        true => "",
-                        false => ", and the rows do not follow one exponential",
-                    },
-                ),
-            );
+            result.warn(WarningCode::StillSettling.warning(format!(
+                "the reading was still settling when the load was changed, {} of a change was missing: the settled \
+                 values are extrapolated{}; keep each load for {enough} rows or more",
+                relative(self.missing, 2),
+                match self.is_exponential {
+                    true => "",
+                    false => ", and the rows do not follow one exponential",
+                },
+            )));
         }
     }
 }

@@ -10,6 +10,7 @@ use super::plateaus::mean;
 use super::settling::RUN;
 use crate::identify::Identification;
 use crate::print::{plural, rounded};
+use crate::warning::WarningCode;
 
 /// Parts of the rows at each load that are tried, the longest first: from and to.
 const PARTS: [[f64; 2]; 11] = [
@@ -105,16 +106,13 @@ impl SteadyReadings {
             (false, _) => format!("last {last} %"),
             (true, true) => format!("first {first} % and the last {last} %"),
         };
-        result.warn(
-            "unsettled-left-out",
-            format!(
-                "the reading is not steady in the {where_} of the rows at each load (the weight still swings, or the load \
-                 was entered late or early): {} of {} are left out, and each load counts once, with the mean of the others; \
-                 let the reading settle before it is taken",
-                self.left_out,
-                plural(self.rows, "row"),
-            ),
-        );
+        result.warn(WarningCode::UnsettledLeftOut.warning(format!(
+            "the reading is not steady in the {where_} of the rows at each load (the weight still swings, or the load \
+             was entered late or early): {} of {} are left out, and each load counts once, with the mean of the others; \
+             let the reading settle before it is taken",
+            self.left_out,
+            plural(self.rows, "row"),
+        )));
     }
 }
 

@@ -5,6 +5,7 @@ use super::{NONE, Point};
 use crate::identify::{Identification, rms};
 use crate::print::{self, rounded};
 use crate::student::student;
+use crate::warning::WarningCode;
 
 /// Standard uncertainties beyond which the zero of the curve contradicts the readings without load.
 const CONTRADICTS: f64 = 2.0;
@@ -51,17 +52,14 @@ pub(super) fn drifting(
     let part = (last.reading - first.reading).abs() / deflection.fold(0.0, f64::max);
     let is_walk = fit.has_even_drift || fit.spreads.drift > 0.0;
     if is_walk && part > DRIFTS {
-        result.warn(
-            "zero-drifts",
-            format!(
-                "the zero reading drifted from {} to {} {unit} over the test, by {} of the largest deflection: the \
-                 fitted zero is that of the middle of the test and does not apply to other records; allow a longer \
-                 warm-up, and read the zero of each record",
-                rounded(first.reading, 4),
-                rounded(last.reading, 4),
-                print::relative(part, 2)
-            ),
-        );
+        result.warn(WarningCode::ZeroDrifts.warning(format!(
+            "the zero reading drifted from {} to {} {unit} over the test, by {} of the largest deflection: the \
+             fitted zero is that of the middle of the test and does not apply to other records; allow a longer \
+             warm-up, and read the zero of each record",
+            rounded(first.reading, 4),
+            rounded(last.reading, 4),
+            print::relative(part, 2)
+        )));
     }
 }
 

@@ -26,7 +26,7 @@ use super::units;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
 use crate::print::plural;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Maximum number of leaves of a channel with an example value.
 const EXAMPLES: usize = 64;
@@ -342,22 +342,25 @@ impl Scan {
 
     fn warnings(&self, channels: &[ChannelReport]) -> Vec<Warning> {
         let mut warnings = Vec::new();
-        let mut say = |code, message: String| warnings.push(Warning::new(code, message));
+        let mut say = |code: WarningCode, message: String| warnings.push(code.warning(message));
         for channel in channels {
             if channel.out_of_order > 0 {
                 let message = format!(
                     "{}: messages logged before the preceding one: {} of {}",
                     channel.topic, channel.out_of_order, channel.messages
                 );
-                say("mcap-out-of-order", message);
+                say(WarningCode::McapOutOfOrder, message);
             }
             if let Some(why) = &channel.unreadable {
-                say("mcap-unreadable", format!("{}: {why}", channel.topic));
+                say(
+                    WarningCode::McapUnreadable,
+                    format!("{}: {why}", channel.topic),
+                );
             }
         }
         if self.broken > 0 {
             let records = plural(self.broken, "truncated message record");
-            say("mcap-skipped", format!("{records} skipped"));
+            say(WarningCode::McapSkipped, format!("{records} skipped"));
         }
         warnings.extend(summary::conflict(self.channels.conflicts));
         warnings

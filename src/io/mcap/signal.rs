@@ -313,7 +313,7 @@ impl TopicSignal {
             return Err(ErrorCode::TimeUnknown
                 .failed(format_args!(
                     "topic {}: its messages have no time stamp (header.stamp, stamp or timestamp); \
-                 use --time log or --time publish",
+                     use --time log or --time publish",
                     self.selected.topic
                 ))
                 .at(&self.name));
@@ -440,7 +440,7 @@ fn is_ours(
     Err(ErrorCode::RecordsDiffer
         .failed(format_args!(
             "the topic {} has channels of different types: channel {} is {} in {}, channel {} \
-         is {} in {}; split the file by channel first",
+             is {} in {}; split the file by channel first",
             ours.record.topic,
             ours.record.id,
             ours.schema_name(),

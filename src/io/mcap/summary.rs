@@ -5,7 +5,7 @@ use super::order::{Sorter, WINDOW};
 use super::record::reader::RecordReader;
 use super::signal::{SelectedSignal, TopicSignal};
 use crate::print::plural;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Summary of a signal.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,13 +98,13 @@ impl Tally {
     fn left_out(&self, signal: &TopicSignal, broken: u64) -> Vec<Warning> {
         let SelectedSignal { topic, field, .. } = &signal.selected;
         let mut warnings = Vec::new();
-        let mut say = |code, message: String| warnings.push(Warning::new(code, message));
+        let mut say = |code: WarningCode, message: String| warnings.push(code.warning(message));
         if let Some(said) = self.unreadable.say("could not be read") {
-            say("mcap-unreadable", format!("{topic}: {said}"));
+            say(WarningCode::McapUnreadable, format!("{topic}: {said}"));
         }
         let what = format!("without {field}");
         if let Some(said) = self.without_item.say(&what) {
-            say("mcap-without-item", format!("{topic}: {said}"));
+            say(WarningCode::McapWithoutItem, format!("{topic}: {said}"));
         }
         if let (Some(by_name), 1..) = (&signal.by_name, self.moved) {
             let message = format!(
@@ -112,7 +112,7 @@ impl Tally {
                  name, as {by_name} does",
                 plural(self.moved, "later message")
             );
-            say("mcap-items-move", message);
+            say(WarningCode::McapItemsMove, message);
         }
         let without_spacing = signal.blocks.without_spacing;
         if self.without_time + broken + without_spacing > 0 {
@@ -121,7 +121,7 @@ impl Tally {
                  spacing, {broken} truncated",
                 self.without_time
             );
-            say("mcap-skipped", message);
+            say(WarningCode::McapSkipped, message);
         }
         warnings
     }
@@ -142,7 +142,8 @@ impl SignalSummary {
         warnings.extend(tally.left_out(signal, broken));
         warnings.extend(out_of_order(topic, sorter));
         let clock = signal.clock.warnings().into_iter();
-        warnings.extend(clock.map(|said| Warning::new("mcap-clock", format!("{topic}: {said}"))));
+        warnings
+            .extend(clock.map(|said| WarningCode::McapClock.warning(format!("{topic}: {said}"))));
         warnings.extend(conflict(conflicts));
         // A number in no message does not exist in the file.
         let unset = if tally.samples > 0 { tally.unset } else { 0 };
@@ -166,7 +167,7 @@ pub(super) fn conflict(conflicts: u64) -> Option<Warning> {
     let message = format!(
         "schemas or channels declared again with different content: {conflicts}; the first declaration was used"
     );
-    (conflicts > 0).then(|| Warning::new("mcap-conflict", message))
+    (conflicts > 0).then(|| WarningCode::McapConflict.warning(message))
 }
 
 /// A warning for each loss of the file.
@@ -177,16 +178,16 @@ pub(super) fn losses(records: &RecordReader, last_ns: Option<i64>) -> Vec<Warnin
         .iter()
         .map(|loss| {
             let last = match (loss.code(), last_ns) {
-                ("mcap-truncated", Some(last)) => format!(" (last message at {last} ns)"),
+                (WarningCode::McapTruncated, Some(last)) => format!(" (last message at {last} ns)"),
                 _ => String::new(),
             };
-            Warning::new(loss.code(), format!("{name}: {loss}{last}"))
+            loss.code().warning(format!("{name}: {loss}{last}"))
         })
         .collect();
     let more = losses.count - losses.first.len();
     if more > 0 {
         let message = format!("{name}: further losses of this kind: {more}");
-        warnings.push(Warning::new("mcap-more-losses", message));
+        warnings.push(WarningCode::McapMoreLosses.warning(message));
     }
     warnings
 }
@@ -194,20 +195,20 @@ pub(super) fn losses(records: &RecordReader, last_ns: Option<i64>) -> Vec<Warnin
 /// Warning about samples that came after later ones.
 fn out_of_order(topic: &str, sorter: &Sorter) -> Vec<Warning> {
     let mut warnings = Vec::new();
-    let mut say = |code, message: String| warnings.push(Warning::new(code, message));
+    let mut say = |code: WarningCode, message: String| warnings.push(code.warning(message));
     if sorter.out_of_order > 0 {
         let message = format!(
             "{topic}: sorted {} that arrived after a later one",
             plural(sorter.out_of_order - sorter.too_late, "sample")
         );
-        say("mcap-out-of-order", message);
+        say(WarningCode::McapOutOfOrder, message);
     }
     if sorter.too_late > 0 {
         let message = format!(
             "{topic}: dropped {} that arrived more than {WINDOW} samples late; sort the file by time first",
             plural(sorter.too_late, "sample")
         );
-        say("mcap-too-late", message);
+        say(WarningCode::McapTooLate, message);
     }
     warnings
 }

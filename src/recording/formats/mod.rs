@@ -20,7 +20,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::io::{ChannelChoice, Reading, names_compensated};
 use crate::print::some_of;
 use crate::unit::{NamedUnit, OF_FULL_SCALE};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Maximum number of channels listed in a warning.
 const NAMED: usize = 10;
@@ -29,7 +29,7 @@ const NAMED: usize = 10;
 fn names_left_out(left_out: &[String]) -> Option<Warning> {
     let names = some_of(left_out, left_out.len(), NAMED);
     let message = format!("left out: {names}");
-    (!left_out.is_empty()).then(|| Warning::new("left-out", message))
+    (!left_out.is_empty()).then(|| WarningCode::LeftOut.warning(message))
 }
 
 /// A format.
@@ -193,10 +193,9 @@ fn plausible_rate(rate_hz: f64) -> Option<f64> {
 
 /// Warning about a file that ends before its announced length.
 fn cut(what: &str) -> Warning {
-    Warning::new(
-        "file-cut",
-        format!("the file ends early: {what}; copy it again if the original is longer"),
-    )
+    WarningCode::FileCut.warning(format!(
+        "the file ends early: {what}; copy it again if the original is longer"
+    ))
 }
 
 /// Failure for a file with inconsistent content.

@@ -9,7 +9,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
 use crate::recording::TimeAxis;
 use crate::unit::OF_FULL_SCALE;
-use crate::warning::Warning;
+use crate::warning::WarningCode;
 
 pub(super) const WAVE: Format = Format {
     name: "wav",
@@ -72,7 +72,7 @@ impl Layout {
             _ => {
                 return Err(ErrorCode::NotARecording.failed(format_args!(
                     "the WAV format {tag} with {bits} bits is not supported; convert \
-                         it to PCM (sox IN.wav -e signed -b 24 OUT.wav)"
+                     it to PCM (sox IN.wav -e signed -b 24 OUT.wav)"
                 )));
             }
         };
@@ -173,8 +173,7 @@ fn data(
         content.lost = Some(cut("the last sample is incomplete"));
     }
     if reading.full_scale.is_none() {
-        content.warnings.push(Warning::new(
-            "full-scale-unknown",
+        content.warnings.push(WarningCode::FullScaleUnknown.warning(
             "the samples are fractions of full scale (-1 to 1), which a WAV file does not state; give it with its \
              unit, as --full-scale \"10 V\"",
         ));

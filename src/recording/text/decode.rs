@@ -7,7 +7,7 @@ use encoding_rs::{Decoder, Encoding, UTF_16BE, UTF_16LE};
 
 use super::encoding;
 use crate::failure::{ErrorCode, Failure};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Number of bytes decoded at a time.
 const PIECE: usize = 1 << 16;
@@ -49,13 +49,10 @@ impl Decoding {
             let whole = last_line.map_or(head, |end| &head[..end]);
             let (decoded, has_faults) = encoding.decode_with_bom_removal(whole);
             if has_faults && !is_wide(encoding) {
-                warnings.push(Warning::new(
-                    "unreadable-characters",
-                    format!(
-                        "some bytes are not valid {}; they were replaced by \u{FFFD}",
-                        encoding::name(encoding)
-                    ),
-                ));
+                warnings.push(WarningCode::UnreadableCharacters.warning(format!(
+                    "some bytes are not valid {}; they were replaced by \u{FFFD}",
+                    encoding::name(encoding)
+                )));
             }
             text = decoded.into_owned().into_bytes();
             refuse_other_formats(&text)?;

@@ -407,7 +407,7 @@ fn unambiguous<'a>(head: &Head, found: &'a [Found], best: &'a Found) -> Result<&
         return Err(ErrorCode::TextUnclear
             .failed(format_args!(
                 "\"{shown}\" can be read with the comma between cells or as a decimal \
-             mark; say which with --delimiter , or --decimal ,"
+                 mark; say which with --delimiter , or --decimal ,"
             ))
             .line(line));
     }

@@ -3,7 +3,7 @@
 use super::cell::Cell;
 use super::rows::{ColumnKind, RowPlan, cleaned};
 use crate::recording::text::dialect::is_skipped;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Kind of a last line without a line end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,14 +60,11 @@ impl LastLine {
         match self {
             Self::Harmless => None,
             Self::Cut => Some(truncated(place, line)),
-            Self::Suspect => Some(Warning::new(
-                "unended-last-line",
-                format!(
-                    "{place}: this last line (\"{}\") has no line ending, unlike the others: its last number may be \
-                     truncated. It was used; check the last sample, or copy the file again",
-                    shortened(line)
-                ),
-            )),
+            Self::Suspect => Some(WarningCode::UnendedLastLine.warning(format!(
+                "{place}: this last line (\"{}\") has no line ending, unlike the others: its last number may be \
+                 truncated. It was used; check the last sample, or copy the file again",
+                shortened(line)
+            ))),
         }
     }
 }
@@ -79,13 +76,10 @@ pub fn last_line(text: &[u8]) -> &[u8] {
 
 /// Loss if a file ends within a line, `line 7`.
 pub fn truncated(line: &str, text: &str) -> Warning {
-    Warning::new(
-        "truncated-last-line",
-        format!(
-            "{line}: the file ends in the middle of this line (\"{}\"); it was skipped, everything before it was used",
-            shortened(text)
-        ),
-    )
+    WarningCode::TruncatedLastLine.warning(format!(
+        "{line}: the file ends in the middle of this line (\"{}\"); it was skipped, everything before it was used",
+        shortened(text)
+    ))
 }
 
 /// A text of at most 60 characters.

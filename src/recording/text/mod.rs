@@ -277,7 +277,7 @@ fn tables(
             return Err(ErrorCode::SeveralTables
                 .failed(format_args!(
                     "there are more than {MOST_TABLES} tables below each other; split the \
-                 file"
+                     file"
                 ))
                 .line(number));
         }
@@ -288,7 +288,7 @@ fn tables(
             return Err(ErrorCode::SeveralTables
                 .failed(format_args!(
                     "a block of its own begins here, and cannot be read: {failure}; split \
-                 the file"
+                     the file"
                 ))
                 .line(number));
         }

@@ -8,11 +8,7 @@ use super::last_line::shortened;
 use super::rows::ColumnKind;
 use super::stream::other_mark;
 use crate::recording::text::dialect::is_skipped;
-use crate::warning::Warning;
-
-/// Codes of the warnings that such a column was skipped.
-const WITH_UNITS: &str = "cells-with-units";
-const WITH_TEXTS: &str = "texts-in-channel";
+use crate::warning::{Warning, WarningCode};
 
 /// Number of rows examined.
 const ROWS: usize = 400;
@@ -21,7 +17,8 @@ const MEASURED: f64 = 0.5;
 
 /// Whether a warning is about a skipped column that may be the channel wanted.
 pub(in crate::recording) fn is_about_one(warning: &Warning) -> bool {
-    [WITH_UNITS, WITH_TEXTS].contains(&warning.code)
+    let codes = [WarningCode::CellsWithUnits, WarningCode::TextsInChannel];
+    codes.map(WarningCode::name).contains(&warning.code)
 }
 
 /// Warnings about columns of channels that were skipped: those with a unit after the first number, and those of texts
@@ -77,18 +74,15 @@ struct SkippedColumn<'a> {
 impl SkippedColumn<'_> {
     fn with_unit(&self, cell: &str) -> Option<Warning> {
         let unit = unit_of_cell(cell, self.table.dialect.decimal)?;
-        Some(Warning::new(
-            WITH_UNITS,
-            format!(
-                "line {}: column {} (\"{}\") reads \"{cell}\": only plain numbers are read, so the column was \
-                 skipped; remove the units from its cells, convert all of them to one unit, and put that in the \
-                 heading: \"{} [{unit}]\"",
-                self.head.number(self.first),
-                self.place + 1,
-                self.field.heading,
-                self.field.name
-            ),
-        ))
+        Some(WarningCode::CellsWithUnits.warning(format!(
+            "line {}: column {} (\"{}\") reads \"{cell}\": only plain numbers are read, so the column was \
+             skipped; remove the units from its cells, convert all of them to one unit, and put that in the \
+             heading: \"{} [{unit}]\"",
+            self.head.number(self.first),
+            self.place + 1,
+            self.field.heading,
+            self.field.name
+        )))
     }
 
     fn with_texts(&self, rows: &[(usize, Vec<String>)]) -> Option<Warning> {
@@ -102,19 +96,16 @@ impl SkippedColumn<'_> {
         let is_measured = measured.count() as f64 > MEASURED * cells.len() as f64;
         let has_unit = self.field.unit.is_some() && !self.field.has_time_unit();
         (has_unit || is_measured).then(|| {
-            Warning::new(
-                WITH_TEXTS,
-                format!(
-                    "line {}: column {} (\"{}\") reads \"{}\", expected a number{}: so do most of its first cells, and \
-                     the column was skipped. Write plain numbers there, and leave the cells without a value empty or \
-                     remove their rows",
-                    self.head.number(*line),
-                    self.place + 1,
-                    self.field.heading,
-                    shortened(cell),
-                    other_mark(cell, decimal)
-                ),
-            )
+            WarningCode::TextsInChannel.warning(format!(
+                "line {}: column {} (\"{}\") reads \"{}\", expected a number{}: so do most of its first cells, and \
+                 the column was skipped. Write plain numbers there, and leave the cells without a value empty or \
+                 remove their rows",
+                self.head.number(*line),
+                self.place + 1,
+                self.field.heading,
+                shortened(cell),
+                other_mark(cell, decimal)
+            ))
         })
     }
 }

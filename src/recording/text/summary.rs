@@ -5,7 +5,7 @@ use super::axes::Role;
 use super::rows::{Column, Rows};
 use crate::print::plural;
 use crate::recording::HoleKind;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Maximum number of summary rows, plus one for each [`PART`] samples.
 const ROWS: usize = 10;
@@ -32,10 +32,9 @@ pub fn leave_out_count(rows: &mut Rows, is_all: bool) -> Option<Warning> {
     }
     let line = rows.line_of(0);
     rows.drop_first();
-    Some(Warning::new(
-        "lines-skipped",
-        format!("line {line} gives the number of rows that follow, {below}; it was skipped"),
-    ))
+    Some(WarningCode::LinesSkipped.warning(format!(
+        "line {line} gives the number of rows that follow, {below}; it was skipped"
+    )))
 }
 
 /// Removes the rows after the last time stamp whose time cells contain texts or nothing: they are not
@@ -73,14 +72,11 @@ pub fn leave_out(rows: &mut Rows, roles: &[Role]) -> Option<Warning> {
     let line = rows.line_of(samples);
     rows.truncate(samples);
     rows.notes.too_wide = rows.notes.too_wide.filter(|wide| *wide < line);
-    Some(Warning::new(
-        "lines-skipped",
-        format!(
-            "{} skipped below the last time stamp, from line {line} on: no time stamp, like sums and means below a \
-             table",
-            plural(behind, "row")
-        ),
-    ))
+    Some(WarningCode::LinesSkipped.warning(format!(
+        "{} skipped below the last time stamp, from line {line} on: no time stamp, like sums and means below a \
+         table",
+        plural(behind, "row")
+    )))
 }
 
 /// Number of rows up to the last stamp.

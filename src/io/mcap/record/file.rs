@@ -11,6 +11,7 @@ use super::input::CountedInput;
 use super::{RECORD_HEAD, record_head};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Input;
+use crate::warning::WarningCode;
 
 /// Longest record read into memory; attachments may be longer, as they are skipped.
 const LONGEST: u64 = chunk::LARGEST;
@@ -137,18 +138,18 @@ pub(crate) enum Loss {
 
 impl Loss {
     /// Stable code for warnings.
-    pub fn code(&self) -> &'static str {
+    pub fn code(&self) -> WarningCode {
         match self {
-            Self::Truncated { .. } => "mcap-truncated",
-            Self::Chunk { .. } | Self::Overrun { .. } => "mcap-damaged-chunk",
+            Self::Truncated { .. } => WarningCode::McapTruncated,
+            Self::Chunk { .. } | Self::Overrun { .. } => WarningCode::McapDamagedChunk,
             Self::TooLong { .. }
             | Self::Unknown { .. }
             | Self::Unreadable { .. }
             | Self::LoneIndex { .. }
-            | Self::EarlyEnd { .. } => "mcap-damaged-record",
-            Self::Checksum { .. } => "mcap-checksum",
-            Self::Undeclared { .. } => "mcap-unknown-channel",
-            Self::MissingChunks { .. } | Self::Count { .. } => "mcap-count",
+            | Self::EarlyEnd { .. } => WarningCode::McapDamagedRecord,
+            Self::Checksum { .. } => WarningCode::McapChecksum,
+            Self::Undeclared { .. } => WarningCode::McapUnknownChannel,
+            Self::MissingChunks { .. } | Self::Count { .. } => WarningCode::McapCount,
         }
     }
 }
@@ -253,7 +254,7 @@ impl FileReader {
             return Err(ErrorCode::NotARecording
                 .failed(
                     "not an MCAP file: it does not begin with the bytes 89 4d 43 41 50 30 0d 0a; \
-                 record with a recorder that writes MCAP, or convert the file first",
+                     record with a recorder that writes MCAP, or convert the file first",
                 )
                 .at(&file.name));
         }

@@ -15,7 +15,7 @@ use crate::recording::moment::{Moment, date_and_time};
 use crate::recording::text::{ClockOrigin, is_time_name};
 use crate::recording::{TimeAxis, without_rounding};
 use crate::unit::NamedUnit;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Maximum number of file properties reported.
 const TOLD: usize = 50;
@@ -207,23 +207,17 @@ fn doubts(object: &TdmsObject, name: &str) -> Option<Warning> {
         let message = format!(
             "\"{name}\": the horizontal axis is in {unit}, not time: the samples have no rate"
         );
-        return Some(Warning::new("no-time-axis", message));
+        return Some(WarningCode::NoTimeAxis.warning(message));
     }
     match object.changed? {
-        "wf_increment" => Some(Warning::new(
-            "no-time-axis",
-            format!(
-                "\"{name}\": wf_increment changes within the file: the samples have no rate; save each part in a \
-                separate file"
-            ),
-        )),
-        changed => Some(Warning::new(
-            "restarted",
-            format!(
-                "\"{name}\": {changed} changes within the file: the recording was restarted, but the samples are timed \
-                 as if it had not been; save each part in a separate file if the times matter"
-            ),
-        )),
+        "wf_increment" => Some(WarningCode::NoTimeAxis.warning(format!(
+            "\"{name}\": wf_increment changes within the file: the samples have no rate; save each part in a \
+             separate file"
+        ))),
+        changed => Some(WarningCode::Restarted.warning(format!(
+            "\"{name}\": {changed} changes within the file: the recording was restarted, but the samples are timed \
+             as if it had not been; save each part in a separate file if the times matter"
+        ))),
     }
 }
 

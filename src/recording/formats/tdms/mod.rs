@@ -13,7 +13,7 @@ use super::bytes::{Bytes, Order};
 use super::{Content, Format, cut, damaged};
 use crate::failure::{ErrorCode, Failure};
 use crate::io::Reading;
-use crate::warning::Warning;
+use crate::warning::WarningCode;
 
 pub(super) const TDMS: Format = Format {
     name: "tdms",
@@ -97,7 +97,7 @@ fn read(bytes: &mut Bytes, reading: &Reading) -> Result<Content, Failure> {
                     "segment {} and everything after it are lost: {failure}",
                     file.segments
                 );
-                content.lost = Some(Warning::new("segment-damaged", message));
+                content.lost = Some(WarningCode::SegmentDamaged.warning(message));
                 break;
             }
             Err(failure) => return Err(failure),

@@ -3,7 +3,7 @@
 use super::groups::Group;
 use super::{AxisRule, Sources};
 use crate::recording::text::units;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Minimum number of rows for comparing two time columns.
 const ROWS: usize = 20;
@@ -16,14 +16,11 @@ impl Sources<'_> {
     pub(super) fn falling_time(&self, used: &[usize], times: &[usize]) -> Option<Warning> {
         let named = |place: &&usize| self.fields[**place].is_named_time();
         let place = used.iter().find(named).filter(|_| times.is_empty())?;
-        Some(Warning::new(
-            "time-falls",
-            format!(
-                "\"{}\" is named like time but decreases too often to be time: it was read as a channel; choose the \
-                 time with --time-column, or give --rate HZ",
-                self.fields[*place].heading
-            ),
-        ))
+        Some(WarningCode::TimeFalls.warning(format!(
+            "\"{}\" is named like time but decreases too often to be time: it was read as a channel; choose the \
+             time with --time-column, or give --rate HZ",
+            self.fields[*place].heading
+        )))
     }
 
     /// A warning if --time-unit contradicts the heading of the time.
@@ -36,7 +33,7 @@ impl Sources<'_> {
             "\"{}\" says {}, --time-unit says {given}; {given} was used",
             field.heading, named.text
         );
-        differs.then(|| Warning::new("unit-overrides-heading", message))
+        differs.then(|| WarningCode::UnitOverridesHeading.warning(message))
     }
 
     /// Warnings about numeric columns that were left out because of their names, but differ from the
@@ -57,14 +54,11 @@ impl Sources<'_> {
                 && runs_otherwise(values, &stamps)
         };
         let warning = |place: &usize| {
-            Warning::new(
-                "time-left-out",
-                format!(
-                    "\"{}\" is named like time but disagrees with the time of the rows; it was ignored (choose another \
-                     time with --time-column)",
-                    self.fields[*place].heading
-                ),
-            )
+            WarningCode::TimeLeftOut.warning(format!(
+                "\"{}\" is named like time but disagrees with the time of the rows; it was ignored (choose another \
+                 time with --time-column)",
+                self.fields[*place].heading
+            ))
         };
         group.times.iter().filter(is_other).map(warning).collect()
     }

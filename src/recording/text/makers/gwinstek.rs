@@ -9,7 +9,7 @@ use crate::recording::text::chunks::Chunks;
 use crate::recording::text::keys;
 use crate::recording::text::table::Layout;
 use crate::recording::{Channel, Recording};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Steps per division of the screen.
 const STEPS: f64 = 25.0;
@@ -65,7 +65,7 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
 
 fn warning(names: &[String], text: impl Fn(&str) -> String) -> Option<Warning> {
     let quoted: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
-    (!names.is_empty()).then(|| Warning::new("screen-steps", text(&quoted.join(", "))))
+    (!names.is_empty()).then(|| WarningCode::ScreenSteps.warning(text(&quoted.join(", "))))
 }
 
 /// Whether all samples are integers.

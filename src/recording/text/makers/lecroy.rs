@@ -9,7 +9,7 @@ use crate::recording::text::head::Head;
 use crate::recording::text::table::Layout;
 use crate::recording::text::{FOR_MAKER, recording_of};
 use crate::recording::{Channel, Recording, Segment};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 const MAKER: Maker = Maker::of_seconds("LeCroy").with_reader(read);
 
@@ -41,10 +41,9 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
     let said = size * list.len();
     let there = samples_of_a_channel(&recording);
     if there < said {
-        recording.lost = Some(Warning::new(
-            "samples-missing",
-            format!("the header gives {said} samples, but there are {there}"),
-        ));
+        recording.lost = Some(WarningCode::SamplesMissing.warning(format!(
+            "the header gives {said} samples, but there are {there}"
+        )));
     } else {
         // These files end without a line end, and everything announced is there.
         let ended = |lost: &mut Warning| lost.code == "unended-last-line";

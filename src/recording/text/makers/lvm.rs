@@ -18,7 +18,7 @@ use crate::recording::text::rows::{self, Column};
 use crate::recording::text::table::channel;
 use crate::recording::without_rounding;
 use crate::recording::{Channel, Recording, Segment, TimeAxis};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 const END: &str = "***End_of_Header***";
 
@@ -361,12 +361,9 @@ fn no_time(file: &File, header: &Header, values: &Column) -> Option<(Option<Chan
     let is_there = file.stamps == Stamps::One && !values.values.is_empty();
     let field = Field::new(dimension, None);
     let axis = is_there.then(|| channel(&field, values.clone(), TimeAxis::default()));
-    let warning = Warning::new(
-        "no-time-axis",
-        format!(
-            "the header says that the horizontal axis is {dimension}, not time: the samples have no rate"
-        ),
-    );
+    let warning = WarningCode::NoTimeAxis.warning(format!(
+        "the header says that the horizontal axis is {dimension}, not time: the samples have no rate"
+    ));
     Some((axis, warning))
 }
 
@@ -374,13 +371,10 @@ fn no_time(file: &File, header: &Header, values: &Column) -> Option<(Option<Chan
 fn missing(header: &Header, place: usize, field: &Field, column: &Column) -> Option<Warning> {
     let said: usize = of(&header.samples, place)?.parse().ok()?;
     (said > column.values.len()).then(|| {
-        Warning::new(
-            "samples-missing",
-            format!(
-                "channel \"{}\": the header gives {said} samples, but there are {}",
-                field.name,
-                column.values.len()
-            ),
-        )
+        WarningCode::SamplesMissing.warning(format!(
+            "channel \"{}\": the header gives {said} samples, but there are {}",
+            field.name,
+            column.values.len()
+        ))
     })
 }

@@ -15,7 +15,7 @@ use crate::recording::text::header::Field;
 use crate::recording::text::rows;
 use crate::recording::text::table::channel;
 use crate::recording::{Recording, TimeAxis};
-use crate::warning::Warning;
+use crate::warning::WarningCode;
 
 const DIALECT: Dialect = Dialect {
     delimiter: Delimiter::Spaces,
@@ -79,13 +79,10 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
     recording.dialect = DIALECT.describe();
     let found = column.values.len() as f64;
     recording.lost = (found < start.count).then(|| {
-        Warning::new(
-            "samples-missing",
-            format!(
-                "the header gives {} samples, but there are {found}",
-                start.count
-            ),
-        )
+        WarningCode::SamplesMissing.warning(format!(
+            "the header gives {} samples, but there are {found}",
+            start.count
+        ))
     });
     let mut axis = TimeAxis::of_header(
         "second line",

@@ -18,7 +18,7 @@ use crate::recording::text::rows;
 use crate::recording::text::table::channel;
 use crate::recording::text::{FOR_MAKER, details, units};
 use crate::recording::{Recording, TimeAxis};
-use crate::warning::Warning;
+use crate::warning::WarningCode;
 
 /// The rules.
 pub const ALL: &[Rule] = &[
@@ -102,13 +102,10 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
         if let Some((said, _)) = said
             && said > column.values.len() as f64
         {
-            recording.lost = Some(Warning::new(
-                "samples-missing",
-                format!(
-                    "the header gives {said} samples, but there are {}",
-                    column.values.len()
-                ),
-            ));
+            recording.lost = Some(WarningCode::SamplesMissing.warning(format!(
+                "the header gives {said} samples, but there are {}",
+                column.values.len()
+            )));
         }
         recording.details.extend(details(&entries));
         recording.channels.push(channel(&field, column, axis));

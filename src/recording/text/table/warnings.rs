@@ -5,7 +5,7 @@ use crate::print::plural;
 use crate::recording::text::keys::{Entry, Topic, quantity};
 use crate::recording::text::rows::LineNotes;
 use crate::recording::text::vocabulary::has;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 impl Layout {
     /// Warnings about its lines and assumptions; `rows` is their number.
@@ -26,7 +26,7 @@ impl Layout {
         said.dedup();
         let confirm = "confirm it with --time-column and --time-unit, or give --rate HZ";
         said.into_iter()
-            .map(|text| Warning::new("time-assumed", format!("{text}; {confirm}")))
+            .map(|text| WarningCode::TimeAssumed.warning(format!("{text}; {confirm}")))
             .collect()
     }
 
@@ -38,7 +38,7 @@ impl Layout {
             "line {line} has more words than the {columns} below it, so they have no names; write headings without spaces, \
              their units as in \"Torque [Nm]\", or separate all cells by tabs or commas"
         );
-        Some(Warning::new("unassigned-headings", message))
+        Some(WarningCode::UnassignedHeadings.warning(message))
     }
 
     /// A warning if a line above whole numbers gives a factor for them.
@@ -60,16 +60,13 @@ impl Layout {
             !values.is_empty() && values.iter().all(|value| value.fract() == 0.0)
         });
         are_whole.then(|| {
-            Warning::new(
-                "scale-in-heading",
-                format!(
-                    "line {} gives a factor, \"{}\" {}, which was not applied to the whole numbers below it; if it should be, \
-                     scale the column and remove that line",
-                    entry.line,
-                    entry.key,
-                    entry.values.join(", ")
-                ),
-            )
+            WarningCode::ScaleInHeading.warning(format!(
+                "line {} gives a factor, \"{}\" {}, which was not applied to the whole numbers below it; if it should be, \
+                 scale the column and remove that line",
+                entry.line,
+                entry.key,
+                entry.values.join(", ")
+            ))
         })
     }
 
@@ -80,13 +77,10 @@ impl Layout {
         let (said, _) = quantity(entry.value()?, self.plan.dialect.decimal)?;
         let is_count = said.fract() == 0.0 && said >= 2.0;
         (is_count && said != rows as f64).then(|| {
-            Warning::new(
-                "sample-count",
-                format!(
-                    "the header gives \"{}\" {said}, but there are {rows} rows",
-                    entry.key
-                ),
-            )
+            WarningCode::SampleCount.warning(format!(
+                "the header gives \"{}\" {said}, but there are {rows} rows",
+                entry.key
+            ))
         })
     }
 }
@@ -94,10 +88,10 @@ impl Layout {
 fn of_lines(notes: &LineNotes, zeros: usize, end: usize) -> Vec<Warning> {
     let mut warnings = Vec::new();
     if zeros > 0 {
-        warnings.push(Warning::new(
-            "zero-bytes",
-            format!("{} in the text skipped", plural(zeros, "zero byte")),
-        ));
+        warnings.push(WarningCode::ZeroBytes.warning(format!(
+            "{} in the text skipped",
+            plural(zeros, "zero byte")
+        )));
     }
     // A last word such as EOF, after all rows, is not a fault.
     let is_footer = |line: usize, text: &str| {
@@ -105,30 +99,21 @@ fn of_lines(notes: &LineNotes, zeros: usize, end: usize) -> Vec<Warning> {
     };
     let odd = notes.odd.as_ref();
     if let Some((line, text)) = odd.filter(|(line, text)| !is_footer(*line, text)) {
-        warnings.push(Warning::new(
-            "lines-skipped",
-            format!(
-                "{} between the rows skipped, not rows of numbers; the first is line {line}: \"{text}\"",
-                plural(notes.odd_count, "line")
-            ),
-        ));
+        warnings.push(WarningCode::LinesSkipped.warning(format!(
+            "{} between the rows skipped, not rows of numbers; the first is line {line}: \"{text}\"",
+            plural(notes.odd_count, "line")
+        )));
     }
     if notes.moved > 0 {
-        warnings.push(Warning::new(
-            "items-move",
-            format!(
-                "in {} the items of a list are in a different order from the first; they were tracked by their names",
-                plural(notes.moved, "row")
-            ),
-        ));
+        warnings.push(WarningCode::ItemsMove.warning(format!(
+            "in {} the items of a list are in a different order from the first; they were tracked by their names",
+            plural(notes.moved, "row")
+        )));
     }
     if let Some(line) = notes.too_wide {
-        warnings.push(Warning::new(
-            "extra-cells",
-            format!(
-                "line {line} has more cells than there are columns; the extra cells were skipped"
-            ),
-        ));
+        warnings.push(WarningCode::ExtraCells.warning(format!(
+            "line {line} has more cells than there are columns; the extra cells were skipped"
+        )));
     }
     warnings
 }
