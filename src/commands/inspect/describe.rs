@@ -81,11 +81,7 @@ fn of_file(recording: &Recording) -> Vec<ChannelWarning> {
 
 /// A warning with the names of the channels concerned.
 pub fn said(warning: Warning, channels: Vec<String>) -> ChannelWarning {
-    ChannelWarning {
-        code: warning.code,
-        message: warning.message,
-        channels,
-    }
+    ChannelWarning { warning, channels }
 }
 
 fn details(recording: &Recording) -> Vec<Detail> {
@@ -176,23 +172,21 @@ fn of_channels(
 fn gathered(warnings: Vec<ChannelWarning>) -> Vec<ChannelWarning> {
     let mut out: Vec<ChannelWarning> = Vec::new();
     for warning in &warnings {
-        let alike: Vec<&ChannelWarning> =
-            warnings.iter().filter(|w| w.code == warning.code).collect();
+        let code = warning.warning.code;
+        let alike = warnings.iter().filter(|w| w.warning.code == code);
+        let alike: Vec<&ChannelWarning> = alike.collect();
         if alike.len() < MANY {
             out.push(warning.clone());
-        } else if out.iter().all(|said| said.code != warning.code) {
+        } else if out.iter().all(|said| said.warning.code != code) {
             let mut channels: Vec<String> = alike.iter().flat_map(|w| w.channels.clone()).collect();
             channels.dedup();
-            out.push(ChannelWarning {
-                code: warning.code,
-                message: format!(
-                    "{} channels, {}; the first: {}",
-                    channels.len(),
-                    listed(&channels),
-                    warning.message
-                ),
-                channels,
-            });
+            let message = format!(
+                "{} channels, {}; the first: {}",
+                channels.len(),
+                listed(&channels),
+                warning.warning.message
+            );
+            out.push(said(Warning { code, message }, channels));
         }
     }
     out

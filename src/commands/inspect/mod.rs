@@ -25,7 +25,6 @@ use crate::outcome::Made;
 use crate::print::{self, Report};
 use crate::quality::copies;
 use crate::recording::Recording;
-use crate::warning::Warning;
 
 /// Runs the verb: reports of many files one by one, or one report that compares them.
 ///
@@ -135,8 +134,7 @@ fn finish(
         let recordings: Vec<&Recording> = contents.map(|content| &content.recording).collect();
         plot.write(plot::svg(&recordings, report).as_bytes())?;
     }
-    let warning = |w: &ChannelWarning| Warning::new(w.code, w.message.clone());
-    let warnings: Vec<Warning> = report.all_warnings().map(warning).collect();
+    let warnings = report.all_warnings().map(|w| w.warning.clone()).collect();
     let outputs = plot.into_iter().chain([output]).collect();
     Ok(Made {
         // The report has them.

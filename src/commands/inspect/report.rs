@@ -8,6 +8,7 @@ use torqcomp_dsp::quality::steps::Event;
 use crate::io::mcap::Inventory;
 use crate::outcome::RecordFigures;
 use crate::recording::Segment;
+use crate::warning::Warning;
 
 /// What recordings hold and what is wrong with them: one file itself, several in `files`.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -68,12 +69,11 @@ pub(super) struct Detail {
 }
 
 /// A warning and the channels that it is about.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub(super) struct ChannelWarning {
-    /// Stable code of the warning.
-    pub(super) code: &'static str,
-    /// Human-readable message.
-    pub(super) message: String,
+    /// What is wrong.
+    #[serde(flatten)]
+    pub(super) warning: Warning,
     /// Names of the channels that the warning is about; none if it is about the file.
     pub(super) channels: Vec<String>,
 }

@@ -34,7 +34,10 @@ fn listed(warnings: &[ChannelWarning], none: &str) -> String {
     }
     let mut text = plural(warnings.len(), "warning") + "\n";
     for warning in warnings {
-        let message = wrapped(&format!("[{}] {}", warning.code, warning.message));
+        let message = wrapped(&format!(
+            "[{}] {}",
+            warning.warning.code, warning.warning.message
+        ));
         text.push_str(&message);
     }
     text
