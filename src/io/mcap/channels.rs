@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 use mcap::records::{self, Record, op};
 
-use super::decode::Encoding;
+use super::decode::{Encoding, MessageType};
 use super::record;
 use super::schema::ros2msg::Generation;
 use super::schema::{Schema, json, protobuf, ros2idl, ros2msg};
@@ -121,17 +121,20 @@ impl DeclaredSchema {
 }
 
 impl TopicChannel {
-    /// Encoding and schema of its messages. For JSON, it is derived from a message.
+    /// What its messages are. For JSON, that is derived from a message.
     ///
     /// # Errors
     /// A sentence with the reason if they cannot be read.
-    pub fn layout(&self, message: &[u8]) -> Result<(Encoding, Arc<Schema>), String> {
+    pub fn message_type(&self, message: &[u8]) -> Result<MessageType, String> {
         let record = &self.record;
         if record.message_encoding == "json" {
             let value = serde_json::from_slice(message)
                 .map_err(|error| format!("its first message is not JSON: {error}"))?;
             let schema = json::read(&value).map_err(|error| error.to_string())?;
-            return Ok((Encoding::Json, Arc::new(schema)));
+            return Ok(MessageType {
+                encoding: Encoding::Json,
+                schema: Arc::new(schema),
+            });
         }
         let Some(schema) = &self.schema else {
             return Err(match record.schema_id {
@@ -156,7 +159,8 @@ impl TopicChannel {
             }
         };
         let parsed = schema.parsed.0.get_or_init(|| schema.read());
-        parsed.clone().map(|schema| (encoding, schema))
+        let schema = parsed.clone()?;
+        Ok(MessageType { encoding, schema })
     }
 
     /// Whether its messages have the same type as those of another channel.
@@ -199,13 +203,17 @@ mod tests {
 
     #[test]
     fn encodings_are_told_or_refused_by_name() {
-        let (encoding, _) = channel("cdr", "ros2msg").layout(b"").unwrap();
-        assert_eq!(encoding, Encoding::Cdr);
-        let (encoding, _) = channel("json", "jsonschema").layout(b"{}").unwrap();
-        assert_eq!(encoding, Encoding::Json);
-        let said = channel("flatbuffer", "flatbuffer").layout(b"").unwrap_err();
+        let refused = |message: &str, schema: &str| -> String {
+            let found = channel(message, schema).message_type(b"");
+            found.err().unwrap()
+        };
+        let of = channel("cdr", "ros2msg").message_type(b"").unwrap();
+        assert_eq!(of.encoding, Encoding::Cdr);
+        let of = channel("json", "jsonschema").message_type(b"{}").unwrap();
+        assert_eq!(of.encoding, Encoding::Json);
+        let said = refused("flatbuffer", "flatbuffer");
         assert!(said.contains("message encoding \"flatbuffer\""), "{said}");
-        let said = channel("cdr", "ros2idl").layout(b"").unwrap_err();
+        let said = refused("cdr", "ros2idl");
         assert!(said.contains("schema \"p/msg/M\", line 1"), "{said}");
     }
 

@@ -236,64 +236,54 @@ impl Decoder {
 /// A name that no item has, to obtain a list of all names.
 const NOBODY: &str = "\0";
 
-/// Names of the items of the list on a path, in a message; `None` if they have none.
-pub fn item_names(
-    encoding: Encoding,
-    schema: &Arc<Schema>,
-    parts: &[PathPart],
-    message: &[u8],
-) -> Option<Vec<String>> {
-    let by_name = path::by_name(parts.to_vec(), NOBODY)?;
-    let route = Route::find(schema, &by_name).ok()?;
-    searched(encoding, schema, &route, message)
+/// What the messages of a channel are.
+pub struct MessageType {
+    /// Their encoding.
+    pub encoding: Encoding,
+    /// Their definition.
+    pub schema: Arc<Schema>,
 }
 
-/// Texts at the end of a path in a message that contains a number; `None` if it cannot be read.
-pub fn texts(
-    encoding: Encoding,
-    schema: &Arc<Schema>,
-    (number, hops): (&Route, &[Hop]),
-    message: &[u8],
-) -> Option<Vec<String>> {
-    let route = Route {
-        lookup: Some(Lookup {
-            hops: hops.to_vec(),
-            name: NOBODY.to_owned(),
-        }),
-        ..number.clone()
-    };
-    searched(encoding, schema, &route, message)
-}
-
-/// All texts searched without finding a name.
-fn searched(
-    encoding: Encoding,
-    schema: &Arc<Schema>,
-    route: &Route,
-    message: &[u8],
-) -> Option<Vec<String>> {
-    match values(encoding, schema, route, message) {
-        Err(Damage::NoName { there, .. }) => Some(there),
-        _ => None,
+impl MessageType {
+    /// Names of the items of the list on a path, in a message; `None` if they have none.
+    pub fn item_names(&self, parts: &[PathPart], message: &[u8]) -> Option<Vec<String>> {
+        let by_name = path::by_name(parts.to_vec(), NOBODY)?;
+        let route = Route::find(&self.schema, &by_name).ok()?;
+        self.searched(&route, message)
     }
-}
 
-/// Values of a number in a message.
-///
-/// # Errors
-/// [`Damage`] if the message does not contain it.
-pub fn values(
-    encoding: Encoding,
-    schema: &Arc<Schema>,
-    route: &Route,
-    message: &[u8],
-) -> Result<Vec<f64>, Damage> {
-    let targets = Targets {
-        value: route.clone(),
-        stamp: None,
-        spacing: None,
-    };
-    let mut reading = Reading::default();
-    Decoder::new(encoding, schema, targets).read(message, &mut reading)?;
-    Ok(reading.values)
+    /// Texts at the end of a path in a message that contains a number; `None` if it cannot be read.
+    pub fn texts(&self, number: &Route, hops: &[Hop], message: &[u8]) -> Option<Vec<String>> {
+        let route = Route {
+            lookup: Some(Lookup {
+                hops: hops.to_vec(),
+                name: NOBODY.to_owned(),
+            }),
+            ..number.clone()
+        };
+        self.searched(&route, message)
+    }
+
+    /// All texts searched without finding a name.
+    fn searched(&self, route: &Route, message: &[u8]) -> Option<Vec<String>> {
+        match self.values(route, message) {
+            Err(Damage::NoName { there, .. }) => Some(there),
+            _ => None,
+        }
+    }
+
+    /// Values of a number in a message.
+    ///
+    /// # Errors
+    /// [`Damage`] if the message does not contain it.
+    pub fn values(&self, route: &Route, message: &[u8]) -> Result<Vec<f64>, Damage> {
+        let targets = Targets {
+            value: route.clone(),
+            stamp: None,
+            spacing: None,
+        };
+        let mut reading = Reading::default();
+        Decoder::new(self.encoding, &self.schema, targets).read(message, &mut reading)?;
+        Ok(reading.values)
+    }
 }

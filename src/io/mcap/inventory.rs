@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::io::Read;
-use std::sync::Arc;
 
 use mcap::records::{Header, Record, op};
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::channels::{Channels, TopicChannel};
-use super::decode::{Encoding, item_names, values};
+use super::decode::MessageType;
 use super::index;
 use super::mixed::two_publishers;
 use super::path::{self, PathPart};
@@ -196,9 +195,9 @@ pub(super) fn only_topic(input: &Input) -> Result<FieldRequest, Failure> {
 type TopicNumbers = (String, Result<bool, String>);
 
 fn numbers_of(channel: &TopicChannel) -> TopicNumbers {
-    let layout = channel.layout(&[]);
+    let of = channel.message_type(&[]);
     let has_numbers = |schema: &Schema| leaves::leaves(schema).0.iter().any(|leaf| !leaf.is_stamp);
-    let numbers = layout.map(|(_, schema)| has_numbers(&schema));
+    let numbers = of.map(|of| has_numbers(&of.schema));
     (channel.record.topic.clone(), numbers)
 }
 
@@ -388,10 +387,10 @@ fn report(channel: &TopicChannel, seen: Option<&ChannelCount>) -> ChannelReport 
     let record = &channel.record;
     let schema = channel.schema.as_ref();
     let first = seen.map(|seen| seen.first.as_slice());
-    let layout = match (first, record.message_encoding.as_str()) {
+    let of = match (first, record.message_encoding.as_str()) {
         // The structure of JSON messages is only known from a message.
         (None, "json") => Err("its fields are unknown without a message".to_owned()),
-        (first, _) => channel.layout(first.unwrap_or(&[])),
+        (first, _) => channel.message_type(first.unwrap_or(&[])),
     };
     let mut report = ChannelReport {
         id: record.id,
@@ -406,17 +405,17 @@ fn report(channel: &TopicChannel, seen: Option<&ChannelCount>) -> ChannelReport 
         out_of_order: seen.map_or(0, |seen| seen.out_of_order),
         ..ChannelReport::default()
     };
-    match layout {
-        Ok((encoding, schema)) => {
-            let (found, more) = leaves::leaves(&schema);
+    match of {
+        Ok(of) => {
+            let (found, more) = leaves::leaves(&of.schema);
             report.has_more_leaves = more;
-            report.stamp = Stamp::find(&schema).map(|stamp| stamp.text);
+            report.stamp = Stamp::find(&of.schema).map(|stamp| stamp.text);
             report.leaves = found
                 .iter()
                 .enumerate()
                 .map(|(place, leaf)| {
                     let message = first.filter(|_| place < EXAMPLES);
-                    leaf_report(leaf, encoding, &schema, message, &record.metadata)
+                    leaf_report(leaf, &of, message, &record.metadata)
                 })
                 .collect();
         }
@@ -427,17 +426,16 @@ fn report(channel: &TopicChannel, seen: Option<&ChannelCount>) -> ChannelReport 
 
 fn leaf_report(
     leaf: &Leaf,
-    encoding: Encoding,
-    schema: &Arc<Schema>,
+    of: &MessageType,
     message: Option<&[u8]>,
     metadata: &BTreeMap<String, String>,
 ) -> LeafReport {
     let parts = path::parse(&leaf.first_item()).ok();
-    let find = |parts: &Vec<PathPart>| Route::find(schema, parts).ok();
+    let find = |parts: &Vec<PathPart>| Route::find(&of.schema, parts).ok();
     let route = parts.as_ref().and_then(find);
     let names = parts
         .zip(message)
-        .and_then(|(parts, message)| item_names(encoding, schema, &parts, message));
+        .and_then(|(parts, message)| of.item_names(&parts, message));
     LeafReport {
         path: leaf.path.clone(),
         kind: leaf.number.name(),
@@ -448,7 +446,7 @@ fn leaf_report(
             .map(|found| found.unit),
         example: route
             .zip(message)
-            .and_then(|(route, message)| values(encoding, schema, &route, message).ok())
+            .and_then(|(route, message)| of.values(&route, message).ok())
             .and_then(|values| values.first().copied()),
         names: names.unwrap_or_default(),
         is_stamp: leaf.is_stamp,

@@ -1,12 +1,10 @@
 //! Topics whose messages mix the numbers of several signals.
 
-use std::sync::Arc;
-
-use super::decode::{Encoding, texts, values};
+use super::decode::MessageType;
 use super::path::{self, PathPart, Slice};
 use super::record::RawMessage;
 use super::route::{self, Route};
-use super::schema::{FieldKind, Schema};
+use super::schema::FieldKind;
 
 /// Number, first and last log time of the messages of each channel of a topic.
 #[derive(Debug, Default)]
@@ -44,18 +42,19 @@ pub(super) fn two_publishers([one, other]: [u16; 2]) -> String {
 /// # Errors
 /// A sentence with their names.
 pub(super) fn one_frame<'a>(
-    encoding: Encoding,
-    schema: &Arc<Schema>,
+    of: &MessageType,
     number: &Route,
     messages: impl Iterator<Item = &'a [u8]>,
 ) -> Result<(), String> {
     let named = [&["header", "frame_id"][..], &["frame_id"]];
-    let ways = named.iter().filter_map(|names| route::way(schema, names));
+    let ways = named
+        .iter()
+        .filter_map(|names| route::way(&of.schema, names));
     let mut ways = ways.filter(|(_, kind)| **kind == FieldKind::Text);
     let Some((way, _)) = ways.next() else {
         return Ok(());
     };
-    let frame = |message| texts(encoding, schema, (number, &way), message)?.pop();
+    let frame = |message| of.texts(number, &way, message)?.pop();
     let frames: Vec<String> = messages.filter_map(frame).collect();
     // One that does not recur is a renamed frame.
     let between = |place: usize| {
@@ -76,22 +75,17 @@ pub(super) fn one_frame<'a>(
 ///
 /// # Errors
 /// A sentence on how to select a row or a column.
-pub(super) fn one_row(
-    encoding: Encoding,
-    schema: &Arc<Schema>,
-    route: &Route,
-    message: &[u8],
-) -> Result<(), String> {
+pub(super) fn one_row(of: &MessageType, route: &Route, message: &[u8]) -> Result<(), String> {
     let mut parts = path::parse(&route.text)?;
     let is_all = parts.pop() == Some(PathPart::Slice(Slice::ALL));
     let (true, Some(PathPart::Name(list))) = (is_all, parts.pop()) else {
         return Ok(());
     };
     let sizes = [&parts[..], &path::parse("layout.dim[:].size")?].concat();
-    let Ok(sizes) = Route::find(schema, &sizes) else {
+    let Ok(sizes) = Route::find(&of.schema, &sizes) else {
         return Ok(());
     };
-    let sizes = values(encoding, schema, &sizes, message).unwrap_or_default();
+    let sizes = of.values(&sizes, message).unwrap_or_default();
     let long: Vec<f64> = sizes.into_iter().filter(|size| *size > 1.0).collect();
     let [_, .., columns] = long[..] else {
         return Ok(());

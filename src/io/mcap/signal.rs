@@ -5,13 +5,12 @@ use std::sync::Arc;
 use super::blocks::{Blocks, Spacing};
 use super::channels::{Channels, TopicChannel};
 use super::clock::ClockCheck;
-use super::decode::{Damage, Decoder, Encoding, Reading, Targets, item_names, values};
+use super::decode::{Damage, Decoder, MessageType, Reading, Targets};
 use super::mixed::{Publishers, one_frame, one_row, two_publishers};
 use super::order::Sorter;
 use super::path::{self, PathPart};
 use super::record::RawMessage;
 use super::route::Route;
-use super::schema::Schema;
 use super::selection::{FieldRequest, FieldText};
 use super::summary::Tally;
 use super::time::{Stamp, TimeChoice, TimeUsed};
@@ -122,20 +121,21 @@ impl TopicSignal {
         message: &RawMessage,
         options: &TimeOptions,
     ) -> Result<Self, String> {
-        let (encoding, schema) = channel.layout(message.data)?;
+        let of = channel.message_type(message.data)?;
+        let schema = &of.schema;
         let parts = field.parts()?;
-        let mut route = Route::find(&schema, &parts)?;
+        let mut route = Route::find(schema, &parts)?;
         if parts.is_empty() && route.is_whole_list() {
-            ask_for_item(encoding, &schema, &route, message.data)?;
+            ask_for_item(&of, &route, message.data)?;
         }
-        one_row(encoding, &schema, &route, message.data)?;
-        let by_name = by_name(encoding, &schema, (&route, parts), message.data);
+        one_row(&of, &route, message.data)?;
+        let by_name = by_name(&of, (&route, parts), message.data);
         let by_name = by_name.map(|named| {
             let text = std::mem::replace(&mut route, named).text;
             std::mem::replace(&mut route.text, text)
         });
-        let spacing = Spacing::find(&schema, &route, options.spacing.as_deref())?;
-        let stamp = Stamp::find(&schema);
+        let spacing = Spacing::find(schema, &route, options.spacing.as_deref())?;
+        let stamp = Stamp::find(schema);
         let selected = SelectedSignal {
             topic: channel.record.topic.clone(),
             schema: channel.schema_name().to_owned(),
@@ -161,7 +161,7 @@ impl TopicSignal {
             publishers: Publishers::default(),
             selected,
             options: options.clone(),
-            decoder: Decoder::new(encoding, &schema, targets),
+            decoder: Decoder::new(of.encoding, schema, targets),
             route,
             by_name,
             reading: Reading::default(),
@@ -291,13 +291,11 @@ impl TopicSignal {
     /// Rejects messages of two frames.
     fn check_frames(&self, first: &[CopiedMessage]) -> Result<(), Failure> {
         let data = first.iter().map(|message| &message.data[..]);
-        let layout = self
-            .channel
-            .layout(first.first().map_or(&[][..], |m| &m.data));
-        let Ok((encoding, schema)) = layout else {
+        let message = first.first().map_or(&[][..], |m| &m.data);
+        let Ok(of) = self.channel.message_type(message) else {
             return Ok(());
         };
-        one_frame(encoding, &schema, &self.route, data).map_err(|why| {
+        one_frame(&of, &self.route, data).map_err(|why| {
             let topic = &self.selected.topic;
             ErrorCode::RecordsDiffer
                 .failed(format_args!("topic {topic}: {why}"))
@@ -352,8 +350,7 @@ impl TopicSignal {
 /// The path by name to an item requested by index, if the first message names it: joints change their index when
 /// several nodes publish on a topic.
 fn by_name(
-    encoding: Encoding,
-    schema: &Arc<Schema>,
+    of: &MessageType,
     (route, parts): (&Route, Vec<PathPart>),
     message: &[u8],
 ) -> Option<Route> {
@@ -361,12 +358,12 @@ fn by_name(
         PathPart::Index(place) => usize::try_from(*place).ok(),
         _ => None,
     })?;
-    let there = item_names(encoding, schema, &parts, message)?;
+    let there = of.item_names(&parts, message)?;
     let name = there.get(place).filter(|name| !name.is_empty())?;
-    let named = Route::find(schema, &path::by_name(parts, name)?).ok()?;
+    let named = Route::find(&of.schema, &path::by_name(parts, name)?).ok()?;
     let is_only = there.iter().filter(|other| *other == name).count() == 1;
     let bits = |route: &Route| {
-        let values = values(encoding, schema, route, message).ok()?;
+        let values = of.values(route, message).ok()?;
         Some(values.into_iter().map(f64::to_bits).collect::<Vec<_>>())
     };
     let is_same = bits(route)? == bits(&named)?;
@@ -375,14 +372,9 @@ fn by_name(
 
 /// Asks for an item of a list, if the only number of a topic is a list with named items, which are not samples of one
 /// signal.
-fn ask_for_item(
-    encoding: Encoding,
-    schema: &Arc<Schema>,
-    route: &Route,
-    message: &[u8],
-) -> Result<(), String> {
+fn ask_for_item(of: &MessageType, route: &Route, message: &[u8]) -> Result<(), String> {
     let parts = path::parse(&route.text).unwrap_or_default();
-    let names = item_names(encoding, schema, &parts, message).unwrap_or_default();
+    let names = of.item_names(&parts, message).unwrap_or_default();
     let field = |name: &String| {
         let parts = path::by_name(parts.clone(), name);
         parts.map(|parts| format!("--field '{}'", path::text(&parts)))
