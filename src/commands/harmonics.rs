@@ -6,6 +6,7 @@ mod level;
 mod lowest;
 mod mains;
 mod multiple;
+mod rotation;
 mod rounding;
 mod speed;
 mod text;
@@ -24,6 +25,7 @@ use torqcomp_dsp::quality::streamed::StreamedFaults;
 use torqcomp_dsp::store::SampleStore;
 use torqcomp_model::{InverseUncertainty, UnitSystem};
 
+use self::rotation::Rotation;
 use super::{made, unit_text};
 use crate::cli;
 use crate::failure::{ErrorCode, Failure};
@@ -225,8 +227,13 @@ fn fundamental(
     let (given_hz, span) = (args.fundamental, 0.01 * args.refine_span);
     let by =
         |orders: &[f64]| mains::refine(&record.samples, record.rate_hz, (given_hz, span), orders);
+    let at = |fundamental_hz: f64| Rotation {
+        record,
+        fundamental_hz,
+        orders,
+    };
     let found = by(orders).and_then(|found| {
-        let all = unlisted::for_refinement(record, found.frequency_hz, orders);
+        let all = unlisted::for_refinement(&at(found.frequency_hz));
         if all.len() > orders.len() {
             by(&all)
         } else {
@@ -235,7 +242,7 @@ fn fundamental(
     });
     found.map_err(|error| match error {
         Error::NotRefined { .. } => {
-            ErrorCode::NotIdentifiable.failed(match speed::warning(record, given_hz, orders) {
+            ErrorCode::NotIdentifiable.failed(match speed::warning(&at(given_hz)) {
                 Some(changes) => changes.message,
                 None => format!(
                     "{error}; --refine-span searches beyond {} % around it",

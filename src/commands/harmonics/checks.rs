@@ -2,6 +2,7 @@
 
 use torqcomp_dsp::harmonics::{Fundamental, Harmonics};
 
+use super::rotation::Rotation;
 use super::{
     ComponentTorque, WayBack, filtered, level, multiple, named, speed, unexplained, unlisted,
 };
@@ -16,10 +17,19 @@ pub(super) fn warnings(
     (fundamental, orders): (&Fundamental, &[f64]),
     (found, components): (&Harmonics, &[ComponentTorque]),
 ) -> Vec<Warning> {
-    let shown = unlisted::shown(record, fundamental.frequency_hz, orders);
-    let mut all = of_orders(way, record, fundamental, (orders, &shown));
+    let given = Rotation {
+        record,
+        fundamental_hz: fundamental.frequency_hz,
+        orders,
+    };
+    let shown = unlisted::shown(&given);
+    let shown = Rotation {
+        orders: &shown,
+        ..given
+    };
+    let mut all = of_orders(way, fundamental.std_hz.is_none(), &given, &shown);
     let little = match all.is_empty() {
-        true => unexplained::warning(record, found, fundamental.frequency_hz, &shown),
+        true => unexplained::warning(&shown, found),
         false => None,
     };
     // Beside that, no component may be called zero.
@@ -31,39 +41,32 @@ pub(super) fn warnings(
     all
 }
 
-/// Checks that the speed is constant and as given, and that all orders are in the band of a compensated record; `shown` are
+/// Checks that the speed is constant and as given, and that all orders are in the band of a compensated record; `shown` has
 /// the requested orders and others that the record shows.
-fn of_orders(
-    way: &WayBack,
-    record: &UniformRecord,
-    fundamental: &Fundamental,
-    (orders, shown): (&[f64], &[f64]),
-) -> Vec<Warning> {
-    let hz = fundamental.frequency_hz;
-    let is_given = fundamental.std_hz.is_none();
-    let load = speed::load_changes(record, hz, orders);
+fn of_orders(way: &WayBack, is_given: bool, of: &Rotation, shown: &Rotation) -> Vec<Warning> {
+    let load = speed::load_changes(of);
     // A load step leaves slow components that bias the speed slightly.
-    let multiple = multiple::warning(record, hz, orders, |hz| way.inverse(hz).norm());
+    let multiple = multiple::warning(of, |hz| way.inverse(hz).norm());
     let changing = match &multiple {
         Some(_) => None,
-        None => speed::warning(record, hz, shown),
+        None => speed::warning(shown),
     };
     let is_steady = |others: &[&Option<Warning>]| others.iter().all(|found| found.is_none());
     let sways = is_steady(&[&multiple, &changing])
-        .then(|| speed::sways(record, hz, shown))
+        .then(|| speed::sways(shown))
         .flatten();
     // A speed that sways has no better mean.
     let off = (is_given && is_steady(&[&multiple, &sways]))
         .then(|| {
-            let off = speed::off(record, hz, shown, load.is_some());
-            off.or_else(|| multiple::other_unit(record, hz, orders))
+            let off = speed::off(shown, load.is_some());
+            off.or_else(|| multiple::other_unit(of))
         })
         .flatten();
     let level = is_steady(&[&off, &changing, &sways])
-        .then(|| level::warning(record, hz, orders))
+        .then(|| level::warning(of))
         .flatten();
     let is_compensated = way.stand.is_none();
-    let beyond = is_compensated.then(|| filtered::warning(record, hz, orders));
+    let beyond = is_compensated.then(|| filtered::warning(of));
     let all = [
         multiple,
         off,

@@ -2,11 +2,10 @@
 
 use torqcomp_dsp::quality::median;
 use torqcomp_dsp::spectrum::{Density, welch_steep};
-use torqcomp_dsp::store::SampleStore;
 
+use super::rotation::Rotation;
 use super::speed::highest;
 use crate::print::{rounded, short};
-use crate::recording::UniformRecord;
 use crate::warning::{Warning, WarningCode};
 
 /// Maximum number of samples evaluated, in one block: an edge between two lines is narrow.
@@ -25,21 +24,16 @@ const FALLEN: f64 = 1.144;
 const NEAR: f64 = 1.05;
 
 /// A warning if orders lie where the spectrum of the record is cut off.
-pub(super) fn warning(
-    record: &UniformRecord,
-    fundamental_hz: f64,
-    orders: &[f64],
-) -> Option<Warning> {
+pub(super) fn warning(of: &Rotation) -> Option<Warning> {
     // A block of the spectrum has an even length.
-    let count = record.samples.count().min(MOST) & !1;
-    let samples = record.samples.part(0..count).ok()?;
-    let density = welch_steep(&samples, record.rate_hz, count).ok()?;
-    let top_hz = top(&density, 0.5 * record.rate_hz)?;
-    let is_beyond = |order: &&f64| *order * fundamental_hz > NEAR * top_hz;
-    let beyond = orders.iter().filter(is_beyond);
+    let samples = of.first(of.count().min(MOST) & !1)?;
+    let density = welch_steep(&samples, of.record.rate_hz, samples.len()).ok()?;
+    let top_hz = top(&density, 0.5 * of.record.rate_hz)?;
+    let is_beyond = |order: &&f64| *order * of.fundamental_hz > NEAR * top_hz;
+    let beyond = of.orders.iter().filter(is_beyond);
     let beyond: Vec<f64> = beyond.copied().collect();
     let names: Vec<String> = beyond.iter().map(|order| short(*order)).collect();
-    let highest_hz = fundamental_hz * highest(&beyond);
+    let highest_hz = of.fundamental_hz * highest(&beyond);
     (!names.is_empty()).then(|| {
         WarningCode::OrdersBeyondBand.warning(format!(
             "the record was filtered above about {} Hz, which removes part or all of {}; compensate again with \

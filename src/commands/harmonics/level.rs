@@ -1,11 +1,10 @@
 //! Check that the components keep their amplitudes: a component that grows over the record is fitted with its mean.
 
-use torqcomp_dsp::harmonics::{Component, Fundamental, fit};
-use torqcomp_dsp::store::SampleStore;
+use torqcomp_dsp::harmonics::Component;
 
+use super::rotation::Rotation;
 use super::speed::{FEWEST, MOST, is_sure};
 use crate::print::rounded;
-use crate::recording::UniformRecord;
 use crate::warning::{Warning, WarningCode};
 
 /// Maximum and minimum number of windows.
@@ -16,25 +15,18 @@ const CHANGE: f64 = 0.2;
 const OVER_NOISE: f64 = 8.0;
 
 /// A warning if the amplitude of a significant component changes over the record.
-pub(super) fn warning(
-    record: &UniformRecord,
-    fundamental_hz: f64,
-    orders: &[f64],
-) -> Option<Warning> {
-    let (count, rate_hz) = (record.samples.count(), record.rate_hz);
-    let lowest = orders.iter().copied().fold(1.0, f64::min);
-    let shortest = (FEWEST * rate_hz / (lowest * fundamental_hz)).ceil() as usize;
+pub(super) fn warning(of: &Rotation) -> Option<Warning> {
+    let count = of.count();
+    let shortest = FEWEST * of.record.rate_hz / (of.lowest() * of.fundamental_hz);
+    let shortest = shortest.ceil() as usize;
     let windows = (count / shortest).min(WINDOWS);
     if windows < FEWEST_WINDOWS {
         return None;
     }
     let length = (count / windows).min(MOST);
     let window = |place: usize| {
-        let start = place * (count - length) / (windows - 1);
-        let samples = record.samples.part(start..start + length).ok()?;
-        let fundamental = Fundamental::given(fundamental_hz);
-        let fitted = fit(&samples[..], rate_hz, 0.0, fundamental, orders).ok()?;
-        Some(fitted.components)
+        let samples = of.window((place, windows), length)?;
+        Some(of.fitted(&samples, of.fundamental_hz)?.components)
     };
     let found: Vec<Vec<Component>> = (0..windows).map(window).collect::<Option<_>>()?;
     let of_order = |k: usize| {
@@ -51,7 +43,7 @@ pub(super) fn warning(
             2 * sure > windows && high - low > OVER_NOISE * std && high - low > CHANGE * mean;
         matters.then(|| [all[0].order, low / mean, high / mean])
     };
-    let changing = (0..orders.len()).filter_map(of_order);
+    let changing = (0..of.orders.len()).filter_map(of_order);
     let [order, low, high] = changing.max_by(|a, b| (a[2] - a[1]).total_cmp(&(b[2] - b[1])))?;
     Some(WarningCode::AmplitudeChanges.warning(format!(
         "the amplitude of order {} changes over the record, between {} and {} times its mean: the components are \

@@ -1,11 +1,10 @@
 //! Check that the fundamental is not a multiple of the speed.
 
 use torqcomp_dsp::harmonics::{Component, Fundamental, fit, refine_fundamental};
-use torqcomp_dsp::store::SampleStore;
 
+use super::rotation::Rotation;
 use super::speed::{FEWEST, FIRST, SPAN, highest, is_sure};
 use crate::print::{enumeration, rounded};
-use crate::recording::UniformRecord;
 use crate::warning::{Warning, WarningCode};
 
 /// Parts of the fundamental that may be the speed.
@@ -17,48 +16,32 @@ const STRONG: f64 = 0.2;
 
 /// A warning if lines between the orders are multiples of half or a third of the fundamental; `inverse` is the torque per
 /// recorded amplitude at a frequency, so that the resonance does not hide them.
-pub(super) fn warning(
-    record: &UniformRecord,
-    fundamental_hz: f64,
-    orders: &[f64],
-    inverse: impl Fn(f64) -> f64,
-) -> Option<Warning> {
+pub(super) fn warning(of: &Rotation, inverse: impl Fn(f64) -> f64) -> Option<Warning> {
     let is_whole = |order: &f64| (order - order.round()).abs() < 1e-6;
-    let length = record.samples.count().min(FIRST);
-    let periods = length as f64 * fundamental_hz / record.rate_hz;
-    if !orders.iter().all(is_whole) || periods < FEWEST * f64::from(PARTS[1]) {
+    let length = of.count().min(FIRST);
+    let periods = length as f64 * of.fundamental_hz / of.record.rate_hz;
+    if !of.orders.iter().all(is_whole) || periods < FEWEST * f64::from(PARTS[1]) {
         return None;
     }
-    let samples = record.samples.part(0..length).ok()?;
-    let of_part = |part: &u32| {
-        let both = (fundamental_hz, *part);
-        of_part(&samples, record.rate_hz, both, orders, &inverse)
-    };
-    PARTS.iter().find_map(of_part)
+    let samples = of.first(length)?;
+    let mut parts = PARTS.into_iter();
+    parts.find_map(|part| of_part(of, &samples, part, &inverse))
 }
 
 /// Hertz per unit in which a speed may have been given as the number of hertz.
 const UNITS: [(&str, f64); 2] = [("rpm", 1.0 / 60.0), ("rad/s", 1.0 / std::f64::consts::TAU)];
 
 /// A warning if the record has no order of the given fundamental, but those of the same number in another unit.
-pub(super) fn other_unit(record: &UniformRecord, given_hz: f64, orders: &[f64]) -> Option<Warning> {
-    let samples = record
-        .samples
-        .part(0..record.samples.count().min(FIRST))
-        .ok()?;
+pub(super) fn other_unit(of: &Rotation) -> Option<Warning> {
+    let (samples, given_hz) = (of.first(FIRST)?, of.fundamental_hz);
     let has_any = |hz: f64| {
-        let fitted = fit(
-            &samples,
-            record.rate_hz,
-            0.0,
-            Fundamental::given(hz),
-            orders,
-        );
-        fitted.is_ok_and(|fitted| fitted.components.iter().any(is_sure))
+        let fitted = of.fitted(&samples, hz);
+        fitted.is_some_and(|fitted| fitted.components.iter().any(is_sure))
     };
     let of_unit = |(unit, hz): &(&str, f64)| {
         let start_hz = given_hz * hz;
-        let found = refine_fundamental(&samples, record.rate_hz, start_hz, SPAN, &[1.0]).ok()?;
+        let rate_hz = of.record.rate_hz;
+        let found = refine_fundamental(&samples, rate_hz, start_hz, SPAN, &[1.0]).ok()?;
         has_any(found.frequency_hz).then(|| {
             WarningCode::FundamentalOff.warning(format!(
                 "no order of {given} Hz stands out, but a line at {} Hz does: if the speed is {given} {unit}, give \
@@ -76,12 +59,12 @@ pub(super) fn other_unit(record: &UniformRecord, given_hz: f64, orders: &[f64]) 
 
 /// The warning about multiples of one part of the fundamental.
 fn of_part(
+    of: &Rotation,
     samples: &[f64],
-    rate_hz: f64,
-    (fundamental_hz, part): (f64, u32),
-    orders: &[f64],
+    part: u32,
     inverse: &impl Fn(f64) -> f64,
 ) -> Option<Warning> {
+    let (rate_hz, fundamental_hz) = (of.record.rate_hz, of.fundamental_hz);
     let start_hz = fundamental_hz / f64::from(part);
     let is_seen = |k: &u32| f64::from(*k) * start_hz * (1.0 + SPAN) < 0.5 * rate_hz;
     let seen = (1..=MULTIPLES).filter(is_seen);
@@ -102,14 +85,8 @@ fn of_part(
     let resolution_hz = rate_hz / samples.len() as f64;
     let is_exact = (found.frequency_hz - start_hz).abs() * highest(&strong) < resolution_hz;
     let orders_are_there = || {
-        let given = fit(
-            samples,
-            rate_hz,
-            0.0,
-            Fundamental::given(fundamental_hz),
-            orders,
-        );
-        given.is_ok_and(|given| given.components.iter().any(is_sure))
+        let given = of.fitted(samples, fundamental_hz);
+        given.is_some_and(|given| given.components.iter().any(is_sure))
     };
     let is_part = match strong.len() {
         0 => false,

@@ -3,13 +3,12 @@
 use std::f64::consts::{PI, TAU};
 
 use torqcomp_dsp::harmonics::{Component, Fundamental, Harmonics, fit, refine_fundamental};
-use torqcomp_dsp::store::SampleStore;
 
 use super::lowest;
 use super::mains::{self, is_at_mains};
+use super::rotation::Rotation;
 use crate::cli::REFINE_SPAN;
 use crate::print::rounded;
-use crate::recording::UniformRecord;
 use crate::warning::{Warning, WarningCode};
 
 /// Number of parts of the record whose speeds are compared.
@@ -40,23 +39,17 @@ const THERE: f64 = 10.0;
 
 /// A warning if another fundamental near the given one gives a much smaller residual: the speed on the nameplate is
 /// not that of the record, and the fitted components are too small.
-pub(super) fn off(
-    record: &UniformRecord,
-    fundamental_hz: f64,
-    orders: &[f64],
-    load_changes: bool,
-) -> Option<Warning> {
-    let length = record.samples.count().min(FIRST);
-    if (length as f64) * fundamental_hz < FEWEST * record.rate_hz {
+pub(super) fn off(of: &Rotation, load_changes: bool) -> Option<Warning> {
+    let (fundamental_hz, rate_hz) = (of.fundamental_hz, of.record.rate_hz);
+    let length = of.count().min(FIRST);
+    if (length as f64) * fundamental_hz < FEWEST * rate_hz {
         return None;
     }
-    let samples = record.samples.part(0..length).ok()?;
-    let rate_hz = record.rate_hz;
-    let of = |fundamental| fit(&samples[..], rate_hz, 0.0, fundamental, orders).ok();
-    let given: Harmonics = of(Fundamental::given(fundamental_hz))?;
+    let samples = of.first(length)?;
+    let given = of.fitted(&samples, fundamental_hz)?;
     let within = |span: f64| {
-        let found = mains::refine(&samples[..], rate_hz, (fundamental_hz, span), orders).ok()?;
-        let better = of(Fundamental::given(found.frequency_hz))?;
+        let found = mains::refine(&samples[..], rate_hz, (fundamental_hz, span), of.orders).ok()?;
+        let better = of.fitted(&samples, found.frequency_hz)?;
         let is_there = better.components.iter().any(is_sure)
             && !is_attracted(&given, &better, length as f64 / rate_hz);
         let rest = better.residual_rms.powi(2);
@@ -81,7 +74,7 @@ pub(super) fn off(
     let found = within(SPAN).or_else(far);
     found.map(|(found, shift_hz, span)| {
         let both_hz = (fundamental_hz, found.frequency_hz);
-        if let Some(other) = lowest::instead_of(&samples, rate_hz, both_hz, orders) {
+        if let Some(other) = lowest::instead_of(&samples, rate_hz, both_hz, of.orders) {
             return other;
         }
         let digits = rounded(found.frequency_hz, 7);
@@ -100,32 +93,28 @@ pub(super) fn off(
 /// A warning if the fundamental differs between parts of the record by more than its uncertainty, and by so much
 /// that the highest order loses its phase. It is estimated from differences over a quarter of the shortest period,
 /// where a load step is a short pulse.
-pub(super) fn warning(
-    record: &UniformRecord,
-    fundamental_hz: f64,
-    orders: &[f64],
-) -> Option<Warning> {
-    let count = record.samples.count();
+pub(super) fn warning(of: &Rotation) -> Option<Warning> {
+    let (fundamental_hz, rate_hz) = (of.fundamental_hz, of.record.rate_hz);
+    let count = of.count();
     let length = (count / PARTS).min(MOST);
-    if (length as f64) * fundamental_hz < FEWEST * record.rate_hz {
+    if (length as f64) * fundamental_hz < FEWEST * rate_hz {
         return None;
     }
-    let highest = highest(orders);
-    let lag = record.rate_hz / (4.0 * highest * fundamental_hz);
+    let highest = highest(of.orders);
+    let lag = rate_hz / (4.0 * highest * fundamental_hz);
     let lag = (lag as usize).clamp(1, length / 4);
     let part = |place: usize, span: f64, length: usize| {
-        let start = place * (count - length) / (PARTS - 1);
-        let samples = record.samples.part(start..start + length).ok()?;
+        let samples = of.window((place, PARTS), length)?;
         let pairs = samples.iter().zip(&samples[lag..]);
         let changes: Vec<f64> = pairs.map(|(before, after)| after - before).collect();
-        speed_in(&changes, record.rate_hz, (fundamental_hz, span), orders)
+        speed_in(of, &changes, span)
     };
     let with = |span, length| -> Option<Vec<(Fundamental, bool)>> {
         let parts = 0..PARTS;
         parts.map(|place| part(place, span, length)).collect()
     };
     // A speed that is not found may change so fast that a line exists over a few periods only.
-    let few = (FEWEST * record.rate_hz / fundamental_hz) as usize;
+    let few = (FEWEST * rate_hz / fundamental_hz) as usize;
     let found = with(SPAN, length).or_else(|| with(WIDE_SPAN, few))?;
     let misled = found.iter().filter(|(_, is_of_orders)| !is_of_orders);
     if 2 * misled.count() > PARTS {
@@ -139,7 +128,7 @@ pub(super) fn warning(
     );
     let change_hz = fastest.frequency_hz - slowest.frequency_hz;
     let std_hz = slowest.std_hz?.hypot(fastest.std_hz?);
-    let duration_s = count as f64 / record.rate_hz;
+    let duration_s = count as f64 / rate_hz;
     let matters = change_hz > SIGNIFICANT * std_hz && change_hz * highest * duration_s > TURNS;
     matters.then(|| {
         WarningCode::SpeedChanges.warning(format!(
@@ -153,17 +142,13 @@ pub(super) fn warning(
 
 /// The fundamental within a relative range around the given one, and whether it is that of the orders: not where none
 /// is significant, nor if it is attracted by another line.
-fn speed_in(
-    samples: &[f64],
-    rate_hz: f64,
-    (given_hz, span): (f64, f64),
-    orders: &[f64],
-) -> Option<(Fundamental, bool)> {
+fn speed_in(of: &Rotation, samples: &[f64], span: f64) -> Option<(Fundamental, bool)> {
+    let (given_hz, rate_hz, orders) = (of.fundamental_hz, of.record.rate_hz, of.orders);
     // The range ends where the highest order exceeds the spectrum.
     let from_hz = given_hz.min(0.5 * rate_hz / highest(orders) / (1.0 + span));
     let found = refine_fundamental(samples, rate_hz, from_hz, span, orders).ok()?;
-    let at = |hz: f64| fit(samples, rate_hz, 0.0, Fundamental::given(hz), orders).ok();
-    let both = at(given_hz).zip(at(found.frequency_hz));
+    let better = of.fitted(samples, found.frequency_hz);
+    let both = of.fitted(samples, given_hz).zip(better);
     let duration_s = samples.len() as f64 / rate_hz;
     let is_of_orders = both.is_none_or(|(given, found)| {
         found.components.iter().any(is_sure) && !is_attracted(&given, &found, duration_s)
@@ -185,24 +170,17 @@ const SWAY_RAD: f64 = 0.2;
 /// A warning if the angle of the shaft fluctuates about that of a steady rotation: the speed is right on average, but
 /// the higher orders are smeared. The angle is the common part of the phases of the orders, each divided by its order,
 /// per window.
-pub(super) fn sways(
-    record: &UniformRecord,
-    fundamental_hz: f64,
-    orders: &[f64],
-) -> Option<Warning> {
-    let rate_hz = record.rate_hz;
-    let count = record.samples.count().min(FIRST);
-    let samples = record.samples.part(0..count).ok()?;
-    let fundamental = Fundamental::given(fundamental_hz);
-    let whole = fit(&samples[..], rate_hz, 0.0, fundamental, orders).ok()?;
-    let lowest = orders.iter().copied().fold(1.0, f64::min);
+pub(super) fn sways(of: &Rotation) -> Option<Warning> {
+    let (samples, rate_hz) = (of.first(FIRST)?, of.record.rate_hz);
+    let fundamental = Fundamental::given(of.fundamental_hz);
+    let whole = of.fitted(&samples, of.fundamental_hz)?;
     PERIODS.into_iter().find_map(|periods| {
-        let shortest = (periods * rate_hz / (lowest * fundamental_hz)).ceil() as usize;
-        let windows = (count / shortest).min(MOST_WINDOWS);
+        let shortest = (periods * rate_hz / (of.lowest() * of.fundamental_hz)).ceil() as usize;
+        let windows = (samples.len() / shortest).min(MOST_WINDOWS);
         let is_enough = windows >= FEWEST_WINDOWS;
         let shown =
             is_enough.then(|| angles_by_order(&samples, rate_hz, fundamental, &whole, windows));
-        sways_by(orders, &shown??)
+        sways_by(of.orders, &shown??)
     })
 }
 
@@ -336,21 +314,16 @@ const OVER_SCATTER: f64 = 8.0;
 
 /// A warning if the mean torque changes over the record, as at a load step: the components depend on the load.
 /// Means are taken over whole periods, in which the components cancel.
-pub(super) fn load_changes(
-    record: &UniformRecord,
-    fundamental_hz: f64,
-    orders: &[f64],
-) -> Option<Warning> {
-    let count = record.samples.count();
-    let period = record.rate_hz / fundamental_hz;
+pub(super) fn load_changes(of: &Rotation) -> Option<Warning> {
+    let (record, count) = (of.record, of.count());
+    let period = record.rate_hz / of.fundamental_hz;
     let periods = (count as f64 / PIECES as f64 / period).floor();
     if periods < 1.0 {
         return None;
     }
     let length = (periods * period).round() as usize;
     let means = (0..PIECES).map(|piece| {
-        let start = piece * (count - length) / (PIECES - 1);
-        let samples = record.samples.part(start..start + length).ok()?;
+        let samples = of.window((piece, PIECES), length)?;
         Some(samples.iter().sum::<f64>() / length as f64)
     });
     let means: Vec<f64> = means.collect::<Option<_>>()?;
@@ -362,8 +335,8 @@ pub(super) fn load_changes(
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), m| {
             (low.min(*m), high.max(*m))
         });
-    let fundamental = Fundamental::given(fundamental_hz);
-    let fitted = fit(&record.samples, record.rate_hz, 0.0, fundamental, orders).ok()?;
+    let fundamental = Fundamental::given(of.fundamental_hz);
+    let fitted = fit(&record.samples, record.rate_hz, 0.0, fundamental, of.orders).ok()?;
     let largest = fitted.components.iter().map(|c| c.phasor.norm());
     let largest = largest.fold(low.abs().max(high.abs()), f64::max);
     let change = high - low;

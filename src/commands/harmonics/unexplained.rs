@@ -3,11 +3,10 @@
 use torqcomp_dsp::harmonics::{Harmonics, without};
 use torqcomp_dsp::quality::median;
 use torqcomp_dsp::spectrum::welch;
-use torqcomp_dsp::store::SampleStore;
 
+use super::rotation::Rotation;
 use super::speed::FIRST;
 use crate::print::rounded;
-use crate::recording::UniformRecord;
 use crate::warning::{Warning, WarningCode};
 
 /// Part of the power of a record, without its mean, that the orders must explain.
@@ -20,27 +19,23 @@ const FAR: f64 = 100.0;
 const BLOCKS: usize = 8;
 
 /// A warning if most of the record is neither orders of the fundamental nor noise: the uncertainties, which are those of
-/// noise near each order, do not allow for that. `shown` are the requested orders and others that the record shows.
-pub(super) fn warning(
-    record: &UniformRecord,
-    found: &Harmonics,
-    fundamental_hz: f64,
-    shown: &[f64],
-) -> Option<Warning> {
-    let samples = record
-        .samples
-        .part(0..record.samples.count().min(FIRST))
-        .ok()?;
-    let frequencies_hz: Vec<f64> = shown.iter().map(|order| order * fundamental_hz).collect();
-    let residual = without(&samples, record.rate_hz, &frequencies_hz).ok()?;
+/// noise near each order, do not allow for that. `shown` has the requested orders and others that the record shows.
+pub(super) fn warning(shown: &Rotation, found: &Harmonics) -> Option<Warning> {
+    let (samples, rate_hz) = (shown.first(FIRST)?, shown.record.rate_hz);
+    let frequencies_hz = shown
+        .orders
+        .iter()
+        .map(|order| order * shown.fundamental_hz);
+    let frequencies_hz: Vec<f64> = frequencies_hz.collect();
+    let residual = without(&samples, rate_hz, &frequencies_hz).ok()?;
     let power = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64;
     let (all, rest) = (
-        power(&without(&samples, record.rate_hz, &[]).ok()?),
+        power(&without(&samples, rate_hz, &[]).ok()?),
         power(&residual),
     );
     let block = 1 << (residual.len() / BLOCKS).checked_ilog2()?;
-    let mut density = welch(&residual, record.rate_hz, block).ok()?.values;
-    let noise = 0.5 * record.rate_hz * median(&mut density)?;
+    let mut density = welch(&residual, rate_hz, block).ok()?.values;
+    let noise = 0.5 * rate_hz * median(&mut density)?;
     let explained = 1.0 - rest / all;
     let percent = match explained < LITTLE {
         true => "hardly anything".to_owned(),
@@ -54,7 +49,7 @@ pub(super) fn warning(
              component (rms) and is not noise: the speed changes within the range, or is another one, or other torques act. \
              Components may be far too small, and their uncertainties do not allow for that: select a shorter part \
              with --range, or give the speed there",
-            rounded(fundamental_hz, 7),
+            rounded(shown.fundamental_hz, 7),
             rounded(rest.sqrt() / largest, 2)
         ))
     })
