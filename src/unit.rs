@@ -71,7 +71,7 @@ impl NamedUnit {
 
     /// Whether it is a unit of time.
     pub fn is_time(&self) -> bool {
-        self.unit.dimension() == Dimension::new([0, 0, 1, 0, 0, 0])
+        self.unit.dimension() == Dimension::TIME
     }
 }
 

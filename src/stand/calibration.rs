@@ -138,9 +138,6 @@ impl RecordedLevels {
     }
 }
 
-const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
-const FORCE: Dimension = Dimension::new([1, 1, -2, 0, 0, 0]);
-
 impl Applied {
     /// Column heading: `torque_n_m`, `torque_ft_lbf`, `applied_v`.
     pub fn heading(&self) -> String {
@@ -173,8 +170,8 @@ impl Applied {
 pub fn applied_by_unit(text: &str, units: UnitSystem) -> Result<Applied, Failure> {
     let unit = Unit::parse(text).map_err(Failure::of(ErrorCode::UnitUnclear))?;
     Ok(match unit.dimension() {
-        TORQUE => Applied::of(Kind::Torque, "torque", units),
-        FORCE => Applied::of(Kind::Force, "force", units),
+        Dimension::TORQUE => Applied::of(Kind::Torque, "torque", units),
+        Dimension::FORCE => Applied::of(Kind::Force, "force", units),
         _ => Applied {
             name: "applied",
             unit: if unit.dimension() == Dimension::NONE {
@@ -233,7 +230,7 @@ impl Stand {
         let signal = TransducerSignal::of(&named.unit);
         let law = match (named.unit.dimension(), signal) {
             (_, Some(signal)) => self.by_signal(signal, channel.name, named, units)?,
-            (TORQUE, _) => StaticLaw {
+            (Dimension::TORQUE, _) => StaticLaw {
                 described: format!("the record is torque in {}", named.text),
                 std: ConstantStd::NotNeeded,
                 ..StaticLaw::of(Conversion::linear(1.0, 0.0))?

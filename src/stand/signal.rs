@@ -39,13 +39,10 @@ impl TransducerSignal {
 
     /// Signal with this unit; `None` for torque, plain ratios and anything else.
     pub fn of(unit: &Unit) -> Option<Self> {
-        const VOLTAGE: Dimension = Dimension::new([1, 2, -3, -1, 0, 0]);
-        const CURRENT: Dimension = Dimension::new([0, 0, 0, 1, 0, 0]);
-        const FORCE: Dimension = Dimension::new([1, 1, -2, 0, 0, 0]);
         match (unit.dimension(), unit.ratio_of()) {
-            (VOLTAGE, _) => Some(Self::Voltage),
-            (CURRENT, _) => Some(Self::Current),
-            (FORCE, _) => Some(Self::Force),
+            (Dimension::VOLTAGE, _) => Some(Self::Voltage),
+            (Dimension::CURRENT, _) => Some(Self::Current),
+            (Dimension::FORCE, _) => Some(Self::Force),
             (_, Some(RatioOf::Voltages)) => Some(Self::Ratio),
             (_, Some(RatioOf::Lengths)) => Some(Self::Strain),
             _ if unit.is_hertz() => Some(Self::Frequency),

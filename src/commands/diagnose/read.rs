@@ -33,8 +33,6 @@ const EXCLUDED: usize = 32;
 /// Inverse of the maximum fraction excluded at the start of a decay, where the hit may not be over.
 const PART_OF_DECAY: usize = 50;
 
-const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
-
 pub(super) struct Pair {
     pub(super) source: String,
     /// `None` for a free decay.
@@ -289,7 +287,11 @@ fn units(pair: &Pair, stand: Option<&Stand>, acts: bool) -> (ChannelUnits, bool)
         channels.map(|unit| unit.as_ref().map_or_else(String::new, |u| u.text.clone()));
     let [applied, measured] = channels.map(|unit| unit.as_ref().map(|u| u.unit.dimension()));
     // Without an applied quantity, its unit is arbitrary.
-    let applied = if acts { applied } else { Some(TORQUE) };
+    let applied = if acts {
+        applied
+    } else {
+        Some(Dimension::TORQUE)
+    };
     let factors = channels.map(|unit| unit.as_ref().map_or(1.0, |u| u.unit.factor()));
     let is_torque_stand = static_gain(stand).is_none();
     let signal = pair
@@ -307,8 +309,9 @@ fn units(pair: &Pair, stand: Option<&Stand>, acts: bool) -> (ChannelUnits, bool)
             && (is_of_bridge && (of.is_some() || s.bridge.is_some())
                 || signal.is_some() && of == signal)
     });
-    let is_calibrated = applied == Some(TORQUE) && has_calibration;
-    let is_torque = applied == Some(TORQUE) && measured == Some(TORQUE) || is_calibrated;
+    let is_calibrated = applied == Some(Dimension::TORQUE) && has_calibration;
+    let is_torque =
+        applied == Some(Dimension::TORQUE) && measured == Some(Dimension::TORQUE) || is_calibrated;
     let diagnosed = match is_torque {
         true => "N m".to_owned(),
         false => si_unit(&measured_text),

@@ -28,9 +28,6 @@ use crate::stand::{self, update};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
 
-const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
-const FORCE: Dimension = Dimension::new([1, 1, -2, 0, 0, 0]);
-
 /// Runs the verb.
 pub fn run(args: &Identify) -> Result<Outcome, Failure> {
     let (findings, inputs) = args.test.target();

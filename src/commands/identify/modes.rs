@@ -1,8 +1,8 @@
 //! Several modes of a response in the form of a stand file.
 
-use torqcomp_model::Estimate;
+use torqcomp_model::{Dimension, Estimate};
 
-use super::{TORQUE, stand_text};
+use super::stand_text;
 use crate::cli::identify::Findings;
 use crate::failure::Failure;
 use crate::identify::{MODE_NUMBERS, ModalShares, Motion, NamedEstimates};
@@ -56,7 +56,8 @@ impl WrittenModes<'_> {
             return false;
         };
         let is_signal = TransducerSignal::of(&measured.unit).is_some();
-        applied.unit.dimension() == TORQUE && (measured.unit.dimension() == TORQUE || is_signal)
+        applied.unit.dimension() == Dimension::TORQUE
+            && (measured.unit.dimension() == Dimension::TORQUE || is_signal)
     }
 
     /// Static response in the units of the channels; 1 if unknown.

@@ -1,10 +1,10 @@
 //! `identify response`.
 
-use torqcomp_model::Estimate;
+use torqcomp_model::{Dimension, Estimate};
 
 use super::constants::{Ratios, from_ratios, from_residue};
 use super::factor::factor_of;
-use super::{FORCE, Recorded, TORQUE, deliver, entry, radius, stand_text, unit_or};
+use super::{Recorded, deliver, entry, radius, stand_text, unit_or};
 use super::{modes, rest};
 use crate::cli::identify::Response;
 use crate::commands::Outcome;
@@ -182,8 +182,8 @@ const NOT_AT_REST: &str = "the static response of these modes is zero, but a sta
 fn scale(applied: &mut Channel, text: &str) -> Result<(), Failure> {
     let (factor, dimension) = factor_of(text, (applied.recorded(), "--applied-unit"))?;
     let unit = match dimension {
-        FORCE => "N",
-        TORQUE => "N m",
+        Dimension::FORCE => "N",
+        Dimension::TORQUE => "N m",
         _ => {
             return Err(ErrorCode::UnitUnsuitable.usage(format_args!(
                 "--torque-factor {text} is no torque or force per unit of a channel; expected one such as \
@@ -199,12 +199,12 @@ fn scale(applied: &mut Channel, text: &str) -> Result<(), Failure> {
 /// Converts a force at a radius to a torque.
 fn to_torque(force: &mut Channel, radius_m: f64) -> Result<(), Failure> {
     let unit = unit_or(force.recorded(), "--applied-unit")?;
-    if unit.unit.dimension() != FORCE {
+    if unit.unit.dimension() != Dimension::FORCE {
         return Err(ErrorCode::ConflictingArguments.usage(format_args!(
             "--radius goes with a force; --applied \"{}\" is in {}{}",
             force.name,
             unit.text,
-            match (TransducerSignal::of(&unit.unit), unit.weight_as(FORCE)) {
+            match (TransducerSignal::of(&unit.unit), unit.weight_as(Dimension::FORCE)) {
                 (Some(_), _) => {
                     ": give the inverse of the sensitivity of the hammer as --torque-factor, such as \"444.4 N/V\" \
                      for 2.25 mV/N, or leave --radius out for natural frequency and damping alone"
@@ -232,7 +232,7 @@ fn calibration(
     let [Some(measured), Some(applied)] = units else {
         return Ok(Vec::new());
     };
-    let is_torque = applied.unit.dimension() == TORQUE;
+    let is_torque = applied.unit.dimension() == Dimension::TORQUE;
     let gain = result
         .get("static_gain")
         .filter(|gain| is_torque && gain.value() != 0.0);
@@ -343,7 +343,7 @@ fn rad_per_n_m(
         let unit = |k: usize| record.channels[k].unit.as_ref().map(|u| u.unit);
         let (applied, measured) = (unit(0)?, unit(1)?);
         let is_rotation = Motion::of(measured.dimension()) == Some((motion, true));
-        let is_known = is_rotation && applied.dimension() == TORQUE;
+        let is_known = is_rotation && applied.dimension() == Dimension::TORQUE;
         is_known.then(|| measured.factor() / applied.factor())
     };
     let first = of(&loaded[0]);

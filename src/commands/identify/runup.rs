@@ -1,7 +1,9 @@
 //! `identify runup`.
 
 use super::factor::factor_of;
-use super::{FORCE, Recorded, TORQUE, deliver, entry, radius, unit_or};
+use torqcomp_model::Dimension;
+
+use super::{Recorded, deliver, entry, radius, unit_or};
 use crate::cli::identify::Runup;
 use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
@@ -102,12 +104,12 @@ fn effort_factor(args: &Runup, torque: &Channel, turning: bool) -> Result<f64, F
     };
     let radius = radius(args.radius.as_deref())?;
     match (turning, dimension, radius) {
-        (true, TORQUE, None) | (false, FORCE, None) => Ok(factor),
-        (true, FORCE, Some(radius)) => Ok(factor * radius),
-        (true, FORCE, None) => Err(ErrorCode::MissingArgument.failed(
+        (true, Dimension::TORQUE, None) | (false, Dimension::FORCE, None) => Ok(factor),
+        (true, Dimension::FORCE, Some(radius)) => Ok(factor * radius),
+        (true, Dimension::FORCE, None) => Err(ErrorCode::MissingArgument.failed(
             "a force on a rotating body needs a radius; give it with --radius",
         )),
-        (true, TORQUE, Some(_)) | (false, FORCE, Some(_)) => {
+        (true, Dimension::TORQUE, Some(_)) | (false, Dimension::FORCE, Some(_)) => {
             Err(ErrorCode::ConflictingArguments.usage(format_args!(
                 "--radius goes with a force on a rotating body; \"{}\" is a {} and \"{}\" {}: omit it",
                 torque.name,
@@ -120,7 +122,7 @@ fn effort_factor(args: &Runup, torque: &Channel, turning: bool) -> Result<f64, F
                 }
             )))
         }
-        (false, TORQUE, _) => Err(ErrorCode::UnitUnsuitable.failed(format_args!(
+        (false, Dimension::TORQUE, _) => Err(ErrorCode::UnitUnsuitable.failed(format_args!(
             "channel \"{}\" is a torque, but \"{}\" is a linear motion: give the force instead, or the motion as \
              an angle; for a drive of known ratio in between, give --torque-factor, such as \"50 N/(N m)\"",
             torque.name, args.motion

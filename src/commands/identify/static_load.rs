@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use torqcomp_decimal::digits;
 use torqcomp_model::{Dimension, Estimate, Kind, RatioOf, Unit};
 
-use super::{FORCE, Recorded, TORQUE, deliver, entry, quantity, radius, replaced, unit_or};
+use super::{Recorded, deliver, entry, quantity, radius, replaced, unit_or};
 use crate::cli::identify::Static;
 use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
@@ -18,8 +18,6 @@ use crate::stand::update::Entry;
 use crate::stand::{AT_TORQUE, TransducerSignal};
 use crate::unit::{NamedUnit, RecordedChannel};
 use crate::warning::Warning;
-
-const MASS: Dimension = Dimension::new([1, 0, 0, 0, 0, 0]);
 
 /// Range of gravity on the Earth's surface, including mountains, in m/s².
 const ON_EARTH: std::ops::RangeInclusive<f64> = 9.76..=9.84;
@@ -107,9 +105,9 @@ fn points(
 ) -> Result<(Vec<Point>, LoadUnits), Failure> {
     let (loads, load_unit) = column(recording, &columns.load, warnings)?;
     let (readings, unit) = column(recording, &columns.reading, warnings)?;
-    let is_effort = [TORQUE, FORCE].contains(&unit.unit.dimension());
-    let is_signal =
-        load_unit.unit.dimension() != FORCE && TransducerSignal::of(&load_unit.unit).is_some();
+    let is_effort = [Dimension::TORQUE, Dimension::FORCE].contains(&unit.unit.dimension());
+    let is_signal = load_unit.unit.dimension() != Dimension::FORCE
+        && TransducerSignal::of(&load_unit.unit).is_some();
     if is_signal && is_effort {
         return Err(ErrorCode::UnitUnsuitable.usage(format_args!(
             "--load \"{}\" is in {} and --reading \"{}\" in {}; the columns are swapped",
@@ -262,7 +260,7 @@ fn refuse_unclear_weight(args: &Static, unit: &NamedUnit) -> Result<(), Failure>
             args.load, unit.text
         )));
     }
-    if let Some(force) = unit.weight_as(TORQUE) {
+    if let Some(force) = unit.weight_as(Dimension::TORQUE) {
         return Err(ErrorCode::UnitUnclear.usage(format_args!(
             "--load \"{}\" is in \"{}\", a mass times a length; if it is a torque, give --load-unit \"{force}\"",
             args.load, unit.text
@@ -280,7 +278,7 @@ fn load_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
     let gravity = gravity.transpose()?;
     on_earth(gravity, args.gravity.as_deref())?;
     refuse_unclear_weight(args, unit)?;
-    let is_mass = unit.unit.dimension() == MASS;
+    let is_mass = unit.unit.dimension() == Dimension::MASS;
     if gravity.is_some() && !is_mass {
         return Err(ErrorCode::ConflictingArguments.usage(format_args!(
             "--gravity goes with a load that is a mass; \"{}\" is in {}",
@@ -288,9 +286,9 @@ fn load_of(args: &Static, unit: &NamedUnit) -> Result<(f64, String), Failure> {
         )));
     }
     match (unit.unit.dimension(), radius) {
-        (TORQUE, None) => Ok((factor, "N m".to_owned())),
-        (FORCE, Some(radius)) => Ok((factor * radius, "N m".to_owned())),
-        (FORCE, None) => Ok((factor, "N".to_owned())),
+        (Dimension::TORQUE, None) => Ok((factor, "N m".to_owned())),
+        (Dimension::FORCE, Some(radius)) => Ok((factor * radius, "N m".to_owned())),
+        (Dimension::FORCE, None) => Ok((factor, "N".to_owned())),
         (_, radius) if is_mass => match (gravity, radius) {
             (None, _) => Err(ErrorCode::MissingArgument.usage(format_args!(
                 "--load \"{}\" is in {}, a mass; give the local gravity, as --gravity \"9.81 m/s^2\" (9.780 \

@@ -435,13 +435,12 @@ fn warnings(
     if points.iter().all(|p| p.series == 0) {
         let has_empty = points.iter().any(|p| p.load.abs() <= NONE * steps.largest);
         result.warn(WarningCode::OneSeries.warning(match has_empty {
-                true => "the loads were applied only once: repeatability is unknown",
-                false => {
-                    "no row without load separates the series of loads: repeatability is unknown; add the readings \
-                     without load, or a column that numbers the series (--series)"
-                }
-            },
-        ));
+            true => "the loads were applied only once: repeatability is unknown",
+            false => {
+                "no row without load separates the series of loads: repeatability is unknown; add the readings \
+                 without load, or a column that numbers the series (--series)"
+            }
+        }));
     }
     if steps.is_rising.iter().all(|is_rising| *is_rising) {
         result.warn(

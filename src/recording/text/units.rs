@@ -1,6 +1,6 @@
 //! Units and headings as written by recorders, in English, German and some other languages.
 
-use torqcomp_model::{Dimension, RatioOf, Unit};
+use torqcomp_model::{RatioOf, Unit};
 
 use crate::unit::{NamedUnit, factor};
 
@@ -138,7 +138,7 @@ pub fn heading(text: &str) -> Heading {
         }
     }
     if let Some(unit) = text.strip_prefix("in ").and_then(read) {
-        let name = if is_time(&unit) { "time" } else { text };
+        let name = if unit.is_time() { "time" } else { text };
         return Heading::new(name.to_owned(), Some(unit), None);
     }
     Heading::new(text.to_owned(), time_word(text), None)
@@ -283,7 +283,11 @@ pub fn scaled_time(heading: &str) -> Option<f64> {
         let mut marks = BEFORE_UNITS.into_iter().chain(["/"]);
         marks.find_map(|mark| Some(heading.split_once(mark)?.1))
     };
-    let unit_of = |text: &str| read(text).filter(is_time).map(|unit| unit.unit.factor());
+    let unit_of = |text: &str| {
+        read(text)
+            .filter(NamedUnit::is_time)
+            .map(|unit| unit.unit.factor())
+    };
     if let Some((factor, unit)) = inside.or_else(word).or_else(named).and_then(factor) {
         return Some(factor * unit_of(unit)?);
     }
@@ -293,11 +297,6 @@ pub fn scaled_time(heading: &str) -> Option<f64> {
     }
     let (factor, rest) = factor(behind)?;
     (rest.is_empty() && factor < 1.0).then_some(factor * unit_of(inside?)?)
-}
-
-/// Whether it is a unit of time.
-pub fn is_time(unit: &NamedUnit) -> bool {
-    unit.unit.dimension() == Dimension::new([0, 0, 1, 0, 0, 0])
 }
 
 #[cfg(test)]

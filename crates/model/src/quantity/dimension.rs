@@ -22,6 +22,18 @@ pub struct Dimension([i32; 6]);
 impl Dimension {
     /// No dimension: a pure number.
     pub const NONE: Self = Self([0; 6]);
+    /// Mass.
+    pub const MASS: Self = Self([1, 0, 0, 0, 0, 0]);
+    /// Time.
+    pub const TIME: Self = Self([0, 0, 1, 0, 0, 0]);
+    /// Force.
+    pub const FORCE: Self = Self([1, 1, -2, 0, 0, 0]);
+    /// Torque.
+    pub const TORQUE: Self = Self([1, 2, -2, 0, 0, 0]);
+    /// Electric current.
+    pub const CURRENT: Self = Self([0, 0, 0, 1, 0, 0]);
+    /// Voltage.
+    pub const VOLTAGE: Self = Self([1, 2, -3, -1, 0, 0]);
 
     /// From the exponents of kg, m, s, A, K and rad, in this order.
     ///

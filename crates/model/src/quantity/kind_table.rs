@@ -74,13 +74,13 @@ const DAMPING: &[(Dimension, f64)] = &[
     (dimension([1, 2, -1, 0, 0, 0]), 1.0),
 ];
 const STIFFNESS: &[(Dimension, f64)] = &[(dimension([1, 2, -2, 0, 0, -1]), 1.0)];
-const TORQUE: &[(Dimension, f64)] = &[(dimension([1, 2, -2, 0, 0, 0]), 1.0)];
-const FORCE: &[(Dimension, f64)] = &[(dimension([1, 1, -2, 0, 0, 0]), 1.0)];
+const TORQUE: &[(Dimension, f64)] = &[(Dimension::TORQUE, 1.0)];
+const FORCE: &[(Dimension, f64)] = &[(Dimension::FORCE, 1.0)];
 const LENGTH: &[(Dimension, f64)] = &[(dimension([0, 1, 0, 0, 0, 0]), 1.0)];
 const AREA: &[(Dimension, f64)] = &[(dimension([0, 2, 0, 0, 0, 0]), 1.0)];
 const SECOND_MOMENT: &[(Dimension, f64)] = &[(dimension([0, 4, 0, 0, 0, 0]), 1.0)];
 const PRESSURE: &[(Dimension, f64)] = &[(dimension([1, -1, -2, 0, 0, 0]), 1.0)];
-const MASS: &[(Dimension, f64)] = &[(dimension([1, 0, 0, 0, 0, 0]), 1.0)];
+const MASS: &[(Dimension, f64)] = &[(Dimension::MASS, 1.0)];
 const FREQUENCY: &[(Dimension, f64)] = &[
     // Plain 1/s, as in samples/s, counts events and so hertz.
     (dimension([0, 0, -1, 0, 0, 0]), 1.0),
@@ -89,10 +89,10 @@ const FREQUENCY: &[(Dimension, f64)] = &[
 const SPEED: &[(Dimension, f64)] = &[(dimension([0, 0, -1, 0, 0, 1]), 1.0)];
 const ANGULAR_ACCELERATION: &[(Dimension, f64)] = &[(dimension([0, 0, -2, 0, 0, 1]), 1.0)];
 const ANGLE: &[(Dimension, f64)] = &[(dimension([0, 0, 0, 0, 0, 1]), 1.0)];
-const TIME: &[(Dimension, f64)] = &[(dimension([0, 0, 1, 0, 0, 0]), 1.0)];
+const TIME: &[(Dimension, f64)] = &[(Dimension::TIME, 1.0)];
 const RATE: &[(Dimension, f64)] = &[(dimension([0, 0, -1, 0, 0, 0]), 1.0)];
-const VOLTAGE: &[(Dimension, f64)] = &[(dimension([1, 2, -3, -1, 0, 0]), 1.0)];
-const CURRENT: &[(Dimension, f64)] = &[(dimension([0, 0, 0, 1, 0, 0]), 1.0)];
+const VOLTAGE: &[(Dimension, f64)] = &[(Dimension::VOLTAGE, 1.0)];
+const CURRENT: &[(Dimension, f64)] = &[(Dimension::CURRENT, 1.0)];
 const RESISTANCE: &[(Dimension, f64)] = &[(dimension([1, 2, -3, -2, 0, 0]), 1.0)];
 const TORQUE_PER_VOLT: &[(Dimension, f64)] = &[(dimension([0, 0, 1, 1, 0, 0]), 1.0)];
 const FORCE_PER_SPEED: &[(Dimension, f64)] = &[

@@ -66,16 +66,16 @@ impl Symbol {
 
 const NONE: Dimension = Dimension::NONE;
 const LENGTH: Dimension = Dimension::new([0, 1, 0, 0, 0, 0]);
-const MASS: Dimension = Dimension::new([1, 0, 0, 0, 0, 0]);
-const TIME: Dimension = Dimension::new([0, 0, 1, 0, 0, 0]);
+const MASS: Dimension = Dimension::MASS;
+const TIME: Dimension = Dimension::TIME;
 const ANGLE: Dimension = Dimension::new([0, 0, 0, 0, 0, 1]);
 const SPEED: Dimension = Dimension::new([0, 0, -1, 0, 0, 1]);
-const FORCE: Dimension = Dimension::new([1, 1, -2, 0, 0, 0]);
-const TORQUE: Dimension = Dimension::new([1, 2, -2, 0, 0, 0]);
+const FORCE: Dimension = Dimension::FORCE;
+const TORQUE: Dimension = Dimension::TORQUE;
 const ANGULAR_MOMENTUM: Dimension = Dimension::new([1, 2, -1, 0, 0, 0]);
 const PRESSURE: Dimension = Dimension::new([1, -1, -2, 0, 0, 0]);
-const CURRENT: Dimension = Dimension::new([0, 0, 0, 1, 0, 0]);
-const VOLTAGE: Dimension = Dimension::new([1, 2, -3, -1, 0, 0]);
+const CURRENT: Dimension = Dimension::CURRENT;
+const VOLTAGE: Dimension = Dimension::VOLTAGE;
 const RESISTANCE: Dimension = Dimension::new([1, 2, -3, -2, 0, 0]);
 const TEMPERATURE: Dimension = Dimension::new([0, 0, 0, 0, 1, 0]);
 const ACCELERATION: Dimension = Dimension::new([0, 1, -2, 0, 0, 0]);

@@ -2,7 +2,6 @@
 
 use super::groups::Group;
 use super::{AxisRule, Sources};
-use crate::recording::text::units;
 use crate::warning::{Warning, WarningCode};
 
 /// Minimum number of rows for comparing two time columns.
@@ -27,7 +26,7 @@ impl Sources<'_> {
     pub(super) fn overridden_unit(&self, rule: &AxisRule) -> Option<Warning> {
         let (given, rule) = self.reading.time_unit.as_ref().zip(rule.stamps.as_ref())?;
         let field = &self.fields[rule.place];
-        let named = field.unit.as_ref().filter(|named| units::is_time(named))?;
+        let named = field.unit.as_ref().filter(|named| named.is_time())?;
         let differs = (named.unit.factor() / rule.seconds_per_unit - 1.0).abs() > 1e-9;
         let message = format!(
             "\"{}\" says {}, --time-unit says {given}; {given} was used",

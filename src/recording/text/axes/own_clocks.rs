@@ -126,7 +126,7 @@ impl Sources<'_> {
     /// Seconds per unit of a column by its heading.
     pub(super) fn own_seconds(&self, place: usize) -> Option<f64> {
         let field = &self.fields[place];
-        let unit = field.unit.as_ref().filter(|unit| units::is_time(unit));
+        let unit = field.unit.as_ref().filter(|unit| unit.is_time());
         units::scaled_time(&field.heading).or(unit.map(|unit| unit.unit.factor()))
     }
 

@@ -152,7 +152,7 @@ impl Sources<'_> {
     pub(super) fn rule_of_steps(&self) -> Option<StampRule> {
         let place = (0..self.fields.len()).find(|place| self.is_steps(*place))?;
         let field = &self.fields[place];
-        let unit = field.unit.as_ref().filter(|unit| units::is_time(unit))?;
+        let unit = field.unit.as_ref().filter(|unit| unit.is_time())?;
         Some(StampRule {
             seconds_per_unit: unit.unit.factor(),
             is_sum: true,
@@ -221,7 +221,7 @@ impl Sources<'_> {
         let seconds_of_name = |place: usize| {
             let field = self.fields.get(place)?;
             let unit = field.unit.as_ref().filter(|_| field.is_named_time())?;
-            units::is_time(unit).then(|| unit.unit.factor())
+            unit.is_time().then(|| unit.unit.factor())
         };
         let seconds_of =
             |place: usize| seconds_of_name(place).or_else(|| self.stamp_without_heading(place));
@@ -308,7 +308,7 @@ impl Sources<'_> {
                 text: text.clone(),
                 unit,
             };
-            if !units::is_time(&named) {
+            if !named.is_time() {
                 return Err(ErrorCode::InvalidValue
                     .usage(format_args!("--time-unit {text} is not a unit of time")));
             }
@@ -324,7 +324,7 @@ impl Sources<'_> {
                 field.heading
             )));
         }
-        if let Some(unit) = field.unit.as_ref().filter(|unit| units::is_time(unit)) {
+        if let Some(unit) = field.unit.as_ref().filter(|unit| unit.is_time()) {
             return Ok(Some((unit.unit.factor(), None)));
         }
         let values = &self.columns[place].values;

@@ -110,7 +110,7 @@ impl Field {
 
     /// Whether its unit is a unit of time.
     pub fn has_time_unit(&self) -> bool {
-        self.unit.as_ref().is_some_and(units::is_time)
+        self.unit.as_ref().is_some_and(NamedUnit::is_time)
     }
 
     /// Whether it is named like time, or has an axis name with a unit of time: `T1 [s]`, `X [s]`.

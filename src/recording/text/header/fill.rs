@@ -5,6 +5,7 @@ use super::field::{Field, without_name};
 use super::labelled::is_name_label;
 use crate::recording::text::keys::{Entry, Topic, topic};
 use crate::recording::text::units;
+use crate::unit::NamedUnit;
 
 /// Names from a line such as `Source,CH1`, if no line above the table has them.
 pub(super) fn fill_names(fields: &mut [Field], entries: &[Entry], used: &[bool]) {
@@ -99,7 +100,7 @@ pub(super) fn fill_axis_unit(fields: &mut [Field], entries: &[Entry]) {
 pub(super) fn fill_time_unit(fields: &mut [Field]) {
     if let [first, _, ..] = fields
         && first.unit_text.is_none()
-        && let Some(unit) = units::read(&first.heading).filter(units::is_time)
+        && let Some(unit) = units::read(&first.heading).filter(NamedUnit::is_time)
     {
         first.unit_text = Some(unit.text.clone());
         first.unit = Some(unit);

@@ -144,7 +144,7 @@ fn above_remarks<'a, 'b>(fitting: &'b [&'a Row<'a>]) -> &'b [&'a Row<'a>] {
     let is_time_above_unit = |pair: &[&Row]| {
         let (below, above) = (pair[0], pair[1]);
         let is_time = |(name, unit): (&String, &String)| {
-            units::is_time_name(name) && units::read(unit).is_some_and(|unit| units::is_time(&unit))
+            units::is_time_name(name) && units::read(unit).is_some_and(|unit| unit.is_time())
         };
         above.line + 1 == below.line
             && is_units(&below.cells)
@@ -286,7 +286,7 @@ fn is_mixed(below: &[String], above: &[String]) -> bool {
     let (Some(unit), Some(name)) = (below.first(), above.first()) else {
         return false;
     };
-    units::read(unit).is_some_and(|unit| units::is_time(&unit))
+    units::read(unit).is_some_and(|unit| unit.is_time())
         && units::is_time_name(name)
         && below.len() > 1
         && below[1..]

@@ -5,6 +5,7 @@ use crate::recording::text::cell::Cell;
 use crate::recording::text::clock::Clock;
 use crate::recording::text::units;
 use crate::recording::text::vocabulary::meaning;
+use crate::unit::NamedUnit;
 
 /// A number with a unit: `1.00E+09 Sa/s`, `20ms`, `1,000 Hz`, `10 000 Hz`.
 pub fn quantity(text: &str, decimal: u8) -> Option<(f64, String)> {
@@ -58,7 +59,7 @@ fn hertz(value: f64, unit: &str, is_interval: bool) -> Option<f64> {
         "s" => 1.0,
         _ => {
             let unit = units::read(unit)?;
-            units::is_time(&unit).then(|| unit.unit.factor())?
+            unit.is_time().then(|| unit.unit.factor())?
         }
     };
     Some(1.0 / (value * seconds)).filter(|hz| hz.is_finite() && *hz > 0.0)
@@ -130,7 +131,7 @@ pub fn seconds(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> 
     match unit {
         "" => Some(value),
         unit => {
-            let unit = units::read(unit).filter(units::is_time)?;
+            let unit = units::read(unit).filter(NamedUnit::is_time)?;
             Some(value * unit.unit.factor())
         }
     }

@@ -18,6 +18,7 @@ use crate::recording::text::rows;
 use crate::recording::text::table::channel;
 use crate::recording::text::{FOR_MAKER, details, units};
 use crate::recording::{Recording, TimeAxis};
+use crate::unit::NamedUnit;
 use crate::warning::WarningCode;
 
 /// The rules.
@@ -137,7 +138,7 @@ fn axis(entries: &[Entry], stamps: Vec<f64>, reading: &Reading) -> TimeAxis {
     let factor = unit
         .and_then(Entry::value)
         .and_then(units::read)
-        .filter(units::is_time)
+        .filter(NamedUnit::is_time)
         .map_or(1.0, |unit| unit.unit.factor());
     let stamps = stamps.into_iter().map(|stamp| stamp * factor).collect();
     let mut axis = TimeAxis::of_stamps("time", Arc::new(stamps));
