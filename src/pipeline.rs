@@ -37,7 +37,7 @@ type Join<'a, J, E> = dyn FnMut(Option<J>, &mut dyn FnMut(J)) -> Result<(), E> +
 
 /// The stages and their state, shared by all threads.
 struct SharedStages<'a, J, S, E> {
-    state: Mutex<State<J, E>>,
+    state: Mutex<PipelineState<J, E>>,
     changed: Condvar,
     read: Mutex<Box<Serial<'a, J, bool, E>>>,
     prepare: Box<dyn Fn(&mut J) + Sync + 'a>,
@@ -46,7 +46,7 @@ struct SharedStages<'a, J, S, E> {
     deliver: Mutex<Box<Serial<'a, J, (), E>>>,
 }
 
-struct State<J, E> {
+struct PipelineState<J, E> {
     free: Vec<J>,
     prepared: BTreeMap<usize, J>,
     ready: VecDeque<(usize, J)>,
@@ -67,7 +67,7 @@ struct State<J, E> {
     panicked: bool,
 }
 
-enum Task<J> {
+enum PipelineTask<J> {
     Deliver(J),
     Join(Option<J>),
     Work(usize, J),
@@ -86,7 +86,7 @@ where
     E: Send,
 {
     let line = SharedStages {
-        state: Mutex::new(State::new(jobs)),
+        state: Mutex::new(PipelineState::new(jobs)),
         changed: Condvar::new(),
         read: Mutex::new(stages.read),
         prepare: stages.prepare,
@@ -116,22 +116,22 @@ impl<J: Default, S, E> SharedStages<'_, J, S, E> {
         let _release = ReleaseOthers(&self.state, &self.changed);
         loop {
             match self.next_task() {
-                Task::Leave => break,
-                Task::Deliver(job) => self.deliver(job),
-                Task::Join(job) => self.join(job),
-                Task::Work(place, mut job) => {
+                PipelineTask::Leave => break,
+                PipelineTask::Deliver(job) => self.deliver(job),
+                PipelineTask::Join(job) => self.join(job),
+                PipelineTask::Work(place, mut job) => {
                     (self.work)(&mut own, &mut job);
                     let mut state = lock(&self.state);
                     state.worked.insert(place, job);
                     state.end(Ok(()));
                 }
-                Task::Read(place, job) => self.read(place, job),
+                PipelineTask::Read(place, job) => self.read(place, job),
             }
             self.changed.notify_all();
         }
     }
 
-    fn next_task(&self) -> Task<J> {
+    fn next_task(&self) -> PipelineTask<J> {
         let mut state = lock(&self.state);
         loop {
             match state.take() {
@@ -192,7 +192,7 @@ impl<J: Default, S, E> SharedStages<'_, J, S, E> {
 }
 
 /// Releases the other threads if the owning thread panics.
-struct ReleaseOthers<'a, J, E>(&'a Mutex<State<J, E>>, &'a Condvar);
+struct ReleaseOthers<'a, J, E>(&'a Mutex<PipelineState<J, E>>, &'a Condvar);
 
 impl<J, E> Drop for ReleaseOthers<'_, J, E> {
     fn drop(&mut self) {
@@ -208,7 +208,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl<J: Default, E> State<J, E> {
+impl<J: Default, E> PipelineState<J, E> {
     fn new(jobs: usize) -> Self {
         Self {
             free: (0..jobs).map(|_| J::default()).collect(),
@@ -231,38 +231,38 @@ impl<J: Default, E> State<J, E> {
     }
 
     /// The task nearest to the end of the pipeline; `None` if there is nothing to do at the moment.
-    fn take(&mut self) -> Option<Task<J>> {
+    fn take(&mut self) -> Option<PipelineTask<J>> {
         if self.panicked
             || self.error.is_some()
             || (self.joined_all && self.next_deliver == self.next_ready)
         {
-            return Some(Task::Leave);
+            return Some(PipelineTask::Leave);
         }
         let task = self.pick()?;
         self.busy += 1;
         Some(task)
     }
 
-    fn pick(&mut self) -> Option<Task<J>> {
+    fn pick(&mut self) -> Option<PipelineTask<J>> {
         if !self.delivering
             && let Some(job) = self.worked.remove(&self.next_deliver)
         {
             self.delivering = true;
-            return Some(Task::Deliver(job));
+            return Some(PipelineTask::Deliver(job));
         }
         if !self.joining && !self.joined_all {
             if let Some(job) = self.prepared.remove(&self.next_join) {
                 self.joining = true;
                 self.next_join += 1;
-                return Some(Task::Join(Some(job)));
+                return Some(PipelineTask::Join(Some(job)));
             }
             if self.read_all && self.next_join == self.next_read {
                 self.joining = true;
-                return Some(Task::Join(None));
+                return Some(PipelineTask::Join(None));
             }
         }
         if let Some((place, job)) = self.ready.pop_front() {
-            return Some(Task::Work(place, job));
+            return Some(PipelineTask::Work(place, job));
         }
         if self.reading || self.read_all {
             return None;
@@ -273,7 +273,7 @@ impl<J: Default, E> State<J, E> {
             other => other?,
         };
         self.reading = true;
-        Some(Task::Read(self.next_read, job))
+        Some(PipelineTask::Read(self.next_read, job))
     }
 
     fn end(&mut self, result: Result<(), E>) {

@@ -3,7 +3,7 @@
 use torqcomp_decimal::Text;
 
 use super::made;
-use super::rows::{self, Rows, Times};
+use super::rows::{self, ResultRows, Times};
 use crate::cli::Extract;
 use crate::failure::Failure;
 use crate::io::output::Output;
@@ -87,7 +87,7 @@ fn write_as_it_is(
     while blocks.next(&mut block)? {
         block.read_rows(plan.as_ref(), grid.as_ref());
         validator.accept(&mut block)?;
-        let rows = Rows {
+        let rows = ResultRows {
             digits: args.digits,
             scale: 1.0,
             rate_hz,

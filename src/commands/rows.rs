@@ -10,7 +10,7 @@ use crate::recording::moment::Moment;
 use crate::recording::{Block, StampGrid};
 
 /// Writes the rows of a result: time, torque and, if requested, the recorded torque.
-pub(super) struct Rows<'a> {
+pub(super) struct ResultRows<'a> {
     pub(super) digits: Digits,
     /// Printed units per SI unit.
     pub(super) scale: f64,
@@ -41,10 +41,10 @@ pub(super) fn uniform_parts(
     (digits, scale): (Digits, f64),
     (rate_hz, start): (f64, Moment),
     samples: Range<usize>,
-) -> impl Iterator<Item = (Rows<'static>, Range<usize>)> {
+) -> impl Iterator<Item = (ResultRows<'static>, Range<usize>)> {
     let end = samples.end;
     samples.step_by(ROWS_AT_ONCE).map(move |first| {
-        let rows = Rows {
+        let rows = ResultRows {
             digits,
             scale,
             rate_hz,
@@ -99,7 +99,7 @@ impl<'a> Times<'a> {
     }
 }
 
-impl Rows<'_> {
+impl ResultRows<'_> {
     /// Digits that resolve a thousandth of a step at the time of the last row. Epoch stamps need more
     /// than a record that starts at zero.
     fn time_digits(&self, rows: usize) -> Digits {

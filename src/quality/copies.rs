@@ -8,7 +8,7 @@ use crate::recording::{Channel, Recording};
 use crate::warning::{Warning, WarningCode};
 
 /// A channel to be compared.
-struct Seen<'a> {
+struct ComparedChannel<'a> {
     label: String,
     channel: &'a Channel,
     portrait: Portrait<'a>,
@@ -16,8 +16,8 @@ struct Seen<'a> {
 
 /// A channel from which others follow.
 struct Family<'a> {
-    first: Seen<'a>,
-    others: Vec<(Seen<'a>, Relation)>,
+    first: ComparedChannel<'a>,
+    others: Vec<(ComparedChannel<'a>, Relation)>,
 }
 
 /// Warnings about channels of one file that follow from each other, each with the names of all of
@@ -47,7 +47,7 @@ impl Family<'_> {
             .others
             .iter()
             .partition(|(_, relation)| relation.identical);
-        let names = |others: &[&(Seen, Relation)]| -> Vec<String> {
+        let names = |others: &[&(ComparedChannel, Relation)]| -> Vec<String> {
             let others = others.iter().map(|(seen, _)| seen.label.clone());
             std::iter::once(first.clone()).chain(others).collect()
         };
@@ -96,7 +96,7 @@ fn follows(first: &str, channel: &Channel, relation: &Relation) -> String {
 
 /// Warnings about channels of different files with equal samples.
 pub fn across(recordings: &[&Recording]) -> Vec<Warning> {
-    let portraits: Vec<Vec<Seen>> = recordings.iter().map(|r| seen(r)).collect();
+    let portraits: Vec<Vec<ComparedChannel>> = recordings.iter().map(|r| seen(r)).collect();
     let mut found = Vec::new();
     for (i, first) in portraits.iter().enumerate() {
         for (j, second) in portraits.iter().enumerate().skip(i + 1) {
@@ -128,13 +128,13 @@ pub fn across(recordings: &[&Recording]) -> Vec<Warning> {
 }
 
 /// The channels suitable for comparison.
-fn seen(recording: &Recording) -> Vec<Seen<'_>> {
+fn seen(recording: &Recording) -> Vec<ComparedChannel<'_>> {
     let labels = labels(&recording.channels);
     let channels = recording.channels.iter().zip(labels);
     channels
         .filter_map(|(channel, label)| {
             let portrait = Portrait::of(&channel.samples)?;
-            Some(Seen {
+            Some(ComparedChannel {
                 label,
                 channel,
                 portrait,

@@ -12,7 +12,7 @@ use torqcomp_dsp::store::SampleStore;
 
 use super::above::{AboveBand, power_above};
 use super::report::CompensateReport;
-use super::sink::{Part, Sink};
+use super::sink::{ResultPart, Sink};
 use super::statistics::ResultSums;
 use super::{Plan, Seen, refined};
 use crate::cli::Compensate;
@@ -139,7 +139,7 @@ fn deliver(
             let beside = if args.with_recorded { recorded } else { &[] };
             rows.write(&mut text, torque, beside);
         }
-        sink.take(&Part {
+        sink.take(&ResultPart {
             rows,
             text: text.as_bytes(),
             torque,

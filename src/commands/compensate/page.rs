@@ -7,7 +7,7 @@ use torqcomp_dsp::spectrum::{Density, StreamedPower};
 use super::Plan;
 use super::plot::Traces;
 use super::report::CompensateReport;
-use super::sink::Part;
+use super::sink::ResultPart;
 use crate::chart::{Chart, MarkedSpan, Page, Series, SpanKind};
 use crate::cli::Compensate;
 use crate::failure::Failure;
@@ -67,7 +67,7 @@ impl PageData {
         })
     }
 
-    pub(super) fn take(&mut self, part: &Part) {
+    pub(super) fn take(&mut self, part: &ResultPart) {
         self.traces.take(part);
         self.recorded.push(part.recorded);
         self.compensated.push(part.torque);

@@ -1,7 +1,7 @@
 //! Chart of the recorded and the compensated signal over time.
 
 use super::report::CompensateReport;
-use super::sink::Part;
+use super::sink::ResultPart;
 use crate::chart::{Chart, Envelope, MarkedSpan, Series, SpanKind, picture};
 
 /// Height of the panel, in user units.
@@ -25,7 +25,7 @@ impl Traces {
         }
     }
 
-    pub(super) fn take(&mut self, part: &Part) {
+    pub(super) fn take(&mut self, part: &ResultPart) {
         let scale = part.rows.scale;
         for (i, (torque, recorded)) in part.torque.iter().zip(part.recorded).enumerate() {
             self.add(part.rows.time_s(i), recorded * scale, torque * scale);

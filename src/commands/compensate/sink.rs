@@ -10,7 +10,7 @@ use super::page::PageData;
 use super::plot::Traces;
 use super::report::CompensateReport;
 use crate::cli::{Compensate, Format};
-use crate::commands::rows::Rows;
+use crate::commands::rows::ResultRows;
 use crate::failure::{ErrorCode, Failure};
 use crate::io::mcap::Writer;
 use crate::io::mcap::writer::{self, Added};
@@ -28,11 +28,11 @@ pub(super) struct Sink {
 
 enum Target {
     Text(Output),
-    Messages(Box<Messages>),
+    Messages(Box<MessageCopy>),
 }
 
 /// A copy of the input with the torque added.
-struct Messages {
+struct MessageCopy {
     writer: Writer<Output>,
     origin: MessageOrigin,
     /// Topic of the torque.
@@ -40,8 +40,8 @@ struct Messages {
 }
 
 /// The next samples of a result.
-pub(super) struct Part<'a> {
-    pub(super) rows: Rows<'a>,
+pub(super) struct ResultPart<'a> {
+    pub(super) rows: ResultRows<'a>,
     /// The rows as text, for a text result.
     pub(super) text: &'a [u8],
     /// Compensated, in SI units.
@@ -68,7 +68,7 @@ impl Sink {
                 output.write(heading(&plan.chain, args.with_recorded).as_bytes())?;
                 Target::Text(output)
             }
-            Format::Mcap => Target::Messages(Box::new(Messages::open(args, plan, output)?)),
+            Format::Mcap => Target::Messages(Box::new(MessageCopy::open(args, plan, output)?)),
         };
         Ok(Self {
             target,
@@ -90,7 +90,7 @@ impl Sink {
         self.page.as_ref()
     }
 
-    pub(super) fn take(&mut self, part: &Part) -> Result<(), Failure> {
+    pub(super) fn take(&mut self, part: &ResultPart) -> Result<(), Failure> {
         if let Some(traces) = &mut self.traces {
             traces.take(part);
         }
@@ -126,7 +126,7 @@ impl Sink {
     }
 }
 
-impl Messages {
+impl MessageCopy {
     fn open(args: &Compensate, plan: &Plan, output: Output) -> Result<Self, Failure> {
         let origin = origin(args, plan)?;
         let topic = args
@@ -152,7 +152,7 @@ impl Messages {
         })
     }
 
-    fn take(&mut self, part: &Part) -> Result<(), Failure> {
+    fn take(&mut self, part: &ResultPart) -> Result<(), Failure> {
         let Self { writer, origin, .. } = self;
         part.torque.iter().enumerate().try_for_each(|(i, torque)| {
             let time_ns = part.rows.time_ns(i, origin.first_ns);

@@ -13,12 +13,12 @@ use torqcomp_dsp::spectrum::{Density, PowerSum, welch_to_the_ends};
 
 use super::above::{AboveBand, power_above};
 use super::report::CompensateReport;
-use super::sink::{Part, Sink};
+use super::sink::{ResultPart, Sink};
 use super::statistics::ResultSums;
 use super::{Plan, Seen};
 use crate::cli::Compensate;
 use crate::commands::convert;
-use crate::commands::rows::{Rows, Times};
+use crate::commands::rows::{ResultRows, Times};
 use crate::failure::Failure;
 use crate::pipeline::{self, Stages};
 use crate::quality::excerpt;
@@ -50,7 +50,7 @@ struct Job {
 }
 
 /// Processing of each sample, the same on every thread.
-struct Steps<'a> {
+struct WindowSteps<'a> {
     half_length: usize,
     noise_block: usize,
     /// The band, if the record is examined for what lies above it.
@@ -98,7 +98,7 @@ pub(super) fn run(
     let convolver = BlockConvolver::new(&filter);
     let noise_block = convolver.block_length().min(LONGEST_NOISE_BLOCK);
     let above = AboveBand::of(&report.band, rate_hz);
-    let steps = Steps {
+    let steps = WindowSteps {
         half_length,
         noise_block,
         watched: above.is_open().then(|| filter.band()),
@@ -148,7 +148,7 @@ fn convolvers(first: BlockConvolver, threads: usize) -> Vec<BlockConvolver> {
 }
 
 impl<'a> Gathered<'a> {
-    fn new(sink: &'a mut Sink, above: AboveBand, steps: &Steps) -> Self {
+    fn new(sink: &'a mut Sink, above: AboveBand, steps: &WindowSteps) -> Self {
         Self {
             sink,
             power: PowerSum::new(steps.noise_block),
@@ -160,9 +160,9 @@ impl<'a> Gathered<'a> {
         }
     }
 
-    fn take(&mut self, steps: &Steps, job: &Job) -> Result<(), Failure> {
+    fn take(&mut self, steps: &WindowSteps, job: &Job) -> Result<(), Failure> {
         let recorded = steps.recorded(&job.window);
-        self.sink.take(&Part {
+        self.sink.take(&ResultPart {
             rows: steps.rows(&job.block, job.first),
             text: job.text.as_bytes(),
             torque: &job.torque,
@@ -186,7 +186,7 @@ impl<'a> Gathered<'a> {
     }
 
     /// Adds the collected results to the report.
-    fn tell(&self, steps: &Steps, filter: &InverseFilter, report: &mut CompensateReport) {
+    fn tell(&self, steps: &WindowSteps, filter: &InverseFilter, report: &mut CompensateReport) {
         report.scale = steps.scale;
         report.start = steps.start;
         report.result = self.sums.statistics(steps.scale);
@@ -304,7 +304,7 @@ impl Joiner {
     }
 }
 
-impl Steps<'_> {
+impl WindowSteps<'_> {
     /// Compensates a window and writes it as text.
     fn work(&self, convolver: &mut BlockConvolver, job: &mut Job) {
         let length = job.window.len() - 2 * self.half_length;
@@ -338,9 +338,9 @@ impl Steps<'_> {
         &window[self.half_length..window.len() - self.half_length]
     }
 
-    fn rows<'a>(&'a self, block: &'a Block, first: usize) -> Rows<'a> {
+    fn rows<'a>(&'a self, block: &'a Block, first: usize) -> ResultRows<'a> {
         let times = Times::of(block, self.grid, self.start, first);
-        Rows {
+        ResultRows {
             digits: self.args.digits,
             scale: self.scale,
             rate_hz: self.rate_hz,

@@ -32,7 +32,7 @@ use crate::warning::Warning;
 pub fn run(args: &Identify) -> Result<Outcome, Failure> {
     let (findings, inputs) = args.test.target();
     // Rejects unwritable outputs before the work.
-    Targets::open(findings, inputs)?;
+    FindingOutputs::open(findings, inputs)?;
     match &args.test {
         Test::Decay(args) => decay::run(args),
         Test::Runup(args) => runup::run(args),
@@ -118,7 +118,7 @@ fn deliver(
     result.warnings.extend(recorded.warnings);
     result.warnings.extend(same::files(&recorded.inputs).0);
     result.convert(UnitSystem::from(findings.units));
-    let mut targets = Targets::open(findings, &recorded.inputs)?;
+    let mut targets = FindingOutputs::open(findings, &recorded.inputs)?;
     if let Some(stand) = &mut targets.stand {
         stand.write(stand_file(findings, entries)?.as_bytes())?;
     }
@@ -143,12 +143,12 @@ fn deliver(
 }
 
 /// The files written by the verb.
-struct Targets {
+struct FindingOutputs {
     stand: Option<Output>,
     page: Option<Output>,
 }
 
-impl Targets {
+impl FindingOutputs {
     /// Opens them; an existing stand file is updated.
     fn open(findings: &Findings, inputs: &[PathBuf]) -> Result<Self, Failure> {
         let result = &findings.result;

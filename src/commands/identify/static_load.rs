@@ -33,7 +33,7 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
         rate_hz: args.table.rate_hz.or(Some(1.0)),
         ..args.table.clone()
     };
-    let columns = Columns::of(args);
+    let columns = LoadColumns::of(args);
     let recording = Recording::read(&Input::of(&args.input), &columns.all(), &reading)?;
     let recording = recording.without_blank_rows();
     let mut recorded = Recorded::default();
@@ -58,7 +58,7 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
 }
 
 /// The columns read.
-struct Columns {
+struct LoadColumns {
     load: ChannelChoice,
     reading: ChannelChoice,
     series: Option<ChannelChoice>,
@@ -66,7 +66,7 @@ struct Columns {
     std: Option<ChannelChoice>,
 }
 
-impl Columns {
+impl LoadColumns {
     fn of(args: &Static) -> Self {
         let plain = |channel: &'static str, name: &Option<String>| {
             let flags = Flags {
@@ -99,7 +99,7 @@ impl Columns {
 /// Loads and readings in SI units, with the names of the units, and warnings about units that contradict the headings.
 fn points(
     args: &Static,
-    columns: &Columns,
+    columns: &LoadColumns,
     recording: &Recording,
     warnings: &mut Vec<Warning>,
 ) -> Result<(Vec<Point>, LoadUnits), Failure> {
@@ -154,7 +154,7 @@ fn points(
 /// the readings.
 fn stds(
     args: &Static,
-    columns: &Columns,
+    columns: &LoadColumns,
     recording: &Recording,
     (reading_unit, factor): (&NamedUnit, f64),
 ) -> Result<Option<Vec<f64>>, Failure> {

@@ -114,7 +114,7 @@ const NAME_BYTES: usize = 200;
 
 /// A name searched for among those of the items of a list.
 #[derive(Debug, Default)]
-pub struct Names<'a> {
+pub struct NameSearch<'a> {
     wanted: &'a [u8],
     /// Number of items seen so far.
     pub seen: usize,
@@ -124,7 +124,7 @@ pub struct Names<'a> {
     there: Option<Vec<String>>,
 }
 
-impl<'a> Names<'a> {
+impl<'a> NameSearch<'a> {
     /// Searches a message with `run`; if the name is missing, a second pass lists the existing ones.
     ///
     /// # Errors

@@ -21,7 +21,7 @@ const BATCH: usize = 1 << 13;
 
 /// An open signal.
 pub struct SignalReader {
-    pass: Pass,
+    pass: FilePass,
     request: FieldRequest,
     signal: TopicSignal,
     /// Number of messages read while opening.
@@ -52,7 +52,7 @@ impl SignalReader {
         choice: &FieldChoice,
         options: &TimeOptions,
     ) -> Result<Self, Failure> {
-        let mut pass = Pass::new(input, stream)?;
+        let mut pass = FilePass::new(input, stream)?;
         let mut wanted = RequestedSignal::new(input, choice)?;
         let mut ahead = 0;
         loop {
@@ -158,7 +158,7 @@ pub fn read_fields(
         .iter()
         .map(|choice| RequestedSignal::new(input, choice));
     let mut wanted = wanted.collect::<Result<Vec<_>, _>>()?;
-    let mut pass = Pass::new(input, input.open()?)?;
+    let mut pass = FilePass::new(input, input.open()?)?;
     let name = input.name();
     let (mut times_ns, mut values) = (Vec::new(), Vec::new());
     loop {
@@ -259,7 +259,7 @@ impl RequestedSignal {
 }
 
 /// A pass through a file.
-struct Pass {
+struct FilePass {
     input: Input,
     records: RecordReader,
     channels: Channels,
@@ -269,7 +269,7 @@ struct Pass {
     is_at_end: bool,
 }
 
-impl Pass {
+impl FilePass {
     fn new(input: &Input, stream: Box<dyn Read + Send>) -> Result<Self, Failure> {
         Ok(Self {
             input: input.clone(),

@@ -1,6 +1,6 @@
 //! Numbers in messages that are parsed as trees of values: JSON and protobuf.
 
-use super::decode::{Damage, Names, Reading, Targets};
+use super::decode::{Damage, NameSearch, Reading, Targets};
 use super::route::Hop;
 use super::schema::{FieldKind, Schema};
 
@@ -57,7 +57,7 @@ impl TreeTargets {
     ) -> Result<(), Damage> {
         let mut called = None;
         if let Some((steps, name)) = &self.lookup {
-            let names = Names::search(name.as_bytes(), |mut names| {
+            let names = NameSearch::search(name.as_bytes(), |mut names| {
                 collect_names(message, steps, &mut names);
                 Ok(names)
             })?;
@@ -147,7 +147,7 @@ pub(crate) fn item_place(index: i64, count: usize) -> Result<usize, Damage> {
 }
 
 /// Compares each text at the end of a path. An item without a name counts as well.
-fn collect_names<'a>(node: impl TreeNode<'a>, steps: &[TreeStep], names: &mut Names) {
+fn collect_names<'a>(node: impl TreeNode<'a>, steps: &[TreeStep], names: &mut NameSearch) {
     match steps.split_first() {
         None => match node.text() {
             Some(text) => names.compare(text),

@@ -32,7 +32,7 @@ fn is(head: &[u8]) -> bool {
 }
 
 /// Storage of samples.
-struct Layout {
+struct WaveLayout {
     number: Number,
     /// Numeric value of full scale, and of zero.
     full: f64,
@@ -42,7 +42,7 @@ struct Layout {
     dialect: String,
 }
 
-impl Layout {
+impl WaveLayout {
     /// Parses a chunk `fmt `.
     fn of(chunk: &[u8], at: u64) -> Result<Self, Failure> {
         let u16_at = |place: usize| {
@@ -124,7 +124,7 @@ fn read(bytes: &mut Bytes, reading: &Reading) -> Result<Content, Failure> {
         }
         let chunk = bytes.take(u64::from(size) + u64::from(size % 2))?;
         match id {
-            b"fmt " => layout = Some(Layout::of(&chunk, at)?),
+            b"fmt " => layout = Some(WaveLayout::of(&chunk, at)?),
             b"ds64" => {
                 let size = chunk
                     .get(8..16)
@@ -139,7 +139,7 @@ fn read(bytes: &mut Bytes, reading: &Reading) -> Result<Content, Failure> {
 /// Reads the samples, of known length or up to the end of the file.
 fn data(
     bytes: &mut Bytes,
-    layout: &Layout,
+    layout: &WaveLayout,
     length: Option<u64>,
     reading: &Reading,
 ) -> Result<Content, Failure> {

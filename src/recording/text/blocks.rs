@@ -4,7 +4,7 @@ use super::axes::Role;
 use super::cell::Cell;
 use super::head::is_end;
 use super::header::Header;
-use super::keys::{self, Entry, Topic};
+use super::keys::{self, HeaderEntry, Topic};
 use super::rows::{ColumnKind, Rows};
 use super::units;
 use crate::recording::text::dialect::Dialect;
@@ -106,7 +106,7 @@ impl TableEnd {
     }
 }
 
-fn is_of_block(entry: &Entry) -> bool {
+fn is_of_block(entry: &HeaderEntry) -> bool {
     use Topic::{Count, Interval, Name, Rate, Unit};
     matches!(entry.topic(), Some(Name | Unit | Rate | Interval | Count))
 }

@@ -56,7 +56,7 @@ use decode::Decoding;
 pub use decode::refuse_binary;
 use head::Head;
 pub use head::is_end as is_end_of_data;
-use keys::Entry;
+use keys::HeaderEntry;
 pub use last_line::{LastLine, last_line};
 use makers::Maker;
 use rows::ColumnKind;
@@ -373,7 +373,7 @@ fn recording_of(parts: Vec<ReadTable>) -> (Recording, Vec<Option<AllSamples>>) {
 }
 
 /// Keys and values for the report.
-fn details(entries: &[Entry]) -> Vec<(String, String)> {
+fn details(entries: &[HeaderEntry]) -> Vec<(String, String)> {
     entries
         .iter()
         .filter(|entry| entry.value().is_some())

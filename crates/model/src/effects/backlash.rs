@@ -196,7 +196,7 @@ fn without_play(samples: &mut [f64], gap: f64, noise_std: f64) -> Vec<usize> {
 
 /// An interval in which the gage stood still while the gap was crossed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Turn {
+struct TurningPoint {
     /// First sample at rest.
     from: usize,
     to: usize,
@@ -207,7 +207,7 @@ struct Turn {
 }
 
 /// Turning points of a signal that exceed `width`.
-fn turns(samples: &[f64], width: f64) -> Vec<Turn> {
+fn turns(samples: &[f64], width: f64) -> Vec<TurningPoint> {
     let mut turns = Vec::new();
     let mut direction = 0.0;
     let (mut high, mut low) = (0, 0);
@@ -235,7 +235,7 @@ fn turns(samples: &[f64], width: f64) -> Vec<Turn> {
 }
 
 /// The interval around an extreme in which the signal stays within `width` of it.
-fn rest(samples: &[f64], before: f64, extreme: usize, width: f64) -> Turn {
+fn rest(samples: &[f64], before: f64, extreme: usize, width: f64) -> TurningPoint {
     let end = samples[extreme];
     let still = |i: &usize| (end - samples[*i]) * before <= width;
     let from = (0..=extreme)
@@ -249,7 +249,7 @@ fn rest(samples: &[f64], before: f64, extreme: usize, width: f64) -> Turn {
         .unwrap_or(extreme);
     // In noise the extreme is the largest of many samples, so the mean estimates the resting value.
     let at = samples[from..=to].iter().sum::<f64>() / (to + 1 - from) as f64;
-    Turn {
+    TurningPoint {
         from,
         to,
         before,

@@ -8,7 +8,7 @@ pub mod walk;
 
 use std::sync::Arc;
 
-use super::decode::{Damage, Names, Reading, Targets};
+use super::decode::{Damage, NameSearch, Reading, Targets};
 use super::schema::{FieldKind, Schema};
 use plan::{CdrPlan, Rules};
 use walk::CdrWalk;
@@ -82,10 +82,10 @@ impl CdrDecoder {
             is_big,
             plan,
             reading,
-            names: Names::default(),
+            names: NameSearch::default(),
         };
         if !plan.lookup.is_empty() {
-            walk.names = Names::search(name, |names| {
+            walk.names = NameSearch::search(name, |names| {
                 (walk.at, walk.names) = (0, names);
                 walk.follow(&plan.lookup)?;
                 Ok(std::mem::take(&mut walk.names))
@@ -149,7 +149,7 @@ impl CdrLayout {
                 is_big,
                 plan,
                 reading,
-                names: Names::default(),
+                names: NameSearch::default(),
             };
             walk.skip(&plan.whole).is_ok() && data.len() - walk.at <= TAIL
         });

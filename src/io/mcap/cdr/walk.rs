@@ -1,7 +1,7 @@
 //! Execution of the steps of a plan on the bytes of a message.
 
 use super::plan::{CdrPlan, Item, List, Pick, Sinks, Step};
-use crate::io::mcap::decode::{Damage, Names, Reading};
+use crate::io::mcap::decode::{Damage, NameSearch, Reading};
 use crate::io::mcap::route::Hop;
 use crate::io::mcap::schema::Number;
 use crate::io::mcap::tree::item_place;
@@ -28,7 +28,7 @@ pub struct CdrWalk<'a> {
     /// The result.
     pub reading: &'a mut Reading,
     /// The wanted name.
-    pub names: Names<'a>,
+    pub names: NameSearch<'a>,
 }
 
 impl<'a> CdrWalk<'a> {

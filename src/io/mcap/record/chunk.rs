@@ -70,14 +70,14 @@ pub(crate) enum ChunkError {
 
 /// Location of a chunk's records after decompression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Unpacked {
+pub(crate) enum UnpackedChunk {
     /// In the buffer.
     Buffer,
     /// In the file as stored: this many bytes after the header.
     InPlace(usize),
 }
 
-impl Unpacked {
+impl UnpackedChunk {
     /// The records, from the remainder or the buffer.
     pub fn records<'a>(self, rest: &'a [u8], buffer: &'a [u8]) -> &'a [u8] {
         match self {
@@ -95,18 +95,18 @@ impl Unpacked {
 pub(crate) fn unpack(
     front: Option<&(ChunkHeader, &[u8])>,
     records: &mut Vec<u8>,
-) -> Result<Unpacked, ChunkError> {
+) -> Result<UnpackedChunk, ChunkError> {
     let (header, packed) = packed(front)?;
     if header.compression.is_empty() {
         check(header, packed)?;
-        return Ok(Unpacked::InPlace(packed.len()));
+        return Ok(UnpackedChunk::InPlace(packed.len()));
     }
     if header.uncompressed_size > LARGEST {
         return Err(ChunkError::TooLarge(header.uncompressed_size));
     }
     unpack_part(header, packed, records)?;
     check(header, records)?;
-    Ok(Unpacked::Buffer)
+    Ok(UnpackedChunk::Buffer)
 }
 
 /// The header of a chunk and its bytes as stored in the file.
@@ -274,7 +274,7 @@ mod tests {
         mut header: ChunkHeader,
         packed: &[u8],
         records: &mut Vec<u8>,
-    ) -> Result<Unpacked, ChunkError> {
+    ) -> Result<UnpackedChunk, ChunkError> {
         header.compressed_size = packed.len() as u64;
         super::unpack(Some(&(header, packed)), records)
     }

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::census::Census;
 use super::chunk::{
-    ChunkError, STEP, Unpacked, chunk_front, is_long, records_of_long, unpack, unpack_part,
+    ChunkError, STEP, UnpackedChunk, chunk_front, is_long, records_of_long, unpack, unpack_part,
 };
 use super::file::{FileReader, FileRecord, Loss, Losses, longest};
 use super::input::CountedInput;
@@ -224,8 +224,8 @@ impl RecordReader {
             return;
         }
         match unpack(front.as_ref(), &mut self.buffer) {
-            Ok(Unpacked::Buffer) => {}
-            Ok(Unpacked::InPlace(length)) => {
+            Ok(UnpackedChunk::Buffer) => {}
+            Ok(UnpackedChunk::InPlace(length)) => {
                 let start = body.len() - front.map_or(0, |(_, rest)| rest.len());
                 self.in_place = Some(start..start + length);
             }

@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 
-use super::token::{Token, tokens};
+use super::token::{SchemaToken, tokens};
 use super::{Field, FieldKind, MOST_STRUCTS, Number, Schema, SchemaError, Struct};
 
 /// Maximum number of dimensions or levels of a list.
@@ -18,7 +18,7 @@ const DEEPEST_LIST: usize = 16;
 pub fn read(name: &str, text: &str) -> Result<Schema, SchemaError> {
     let tokens = tokens(text)?;
     let mut declared = Declared::default();
-    let mut parser = Parser {
+    let mut parser = IdlParser {
         tokens: &tokens,
         at: 0,
         scope: Vec::new(),
@@ -52,14 +52,14 @@ struct Declared {
     constants: HashMap<String, u32>,
 }
 
-struct Parser<'a, 'd> {
-    tokens: &'a [Token<'a>],
+struct IdlParser<'a, 'd> {
+    tokens: &'a [SchemaToken<'a>],
     at: usize,
     scope: Vec<String>,
     declared: &'d mut Declared,
 }
 
-impl<'a> Parser<'a, '_> {
+impl<'a> IdlParser<'a, '_> {
     fn file(&mut self) -> Result<(), SchemaError> {
         while self.at < self.tokens.len() {
             self.declaration()?;
@@ -302,7 +302,7 @@ impl<'a> Parser<'a, '_> {
         full + name
     }
 
-    fn token(&mut self) -> Result<Token<'a>, SchemaError> {
+    fn token(&mut self) -> Result<SchemaToken<'a>, SchemaError> {
         let token = self.tokens.get(self.at).copied();
         self.at += 1;
         token.ok_or_else(|| self.error("it ends too early"))

@@ -4,7 +4,7 @@ use super::SchemaError;
 
 /// A word, a sign, a number or a quoted text, and its line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Token<'a> {
+pub struct SchemaToken<'a> {
     /// As written; quoted text without its quotes.
     pub text: &'a str,
     /// Whether it was quoted.
@@ -17,7 +17,7 @@ pub struct Token<'a> {
 ///
 /// # Errors
 /// [`SchemaError`] if a quote or a comment is not closed.
-pub fn tokens(text: &str) -> Result<Vec<Token<'_>>, SchemaError> {
+pub fn tokens(text: &str) -> Result<Vec<SchemaToken<'_>>, SchemaError> {
     let mut tokens = Vec::new();
     let mut line = 1;
     let mut rest = text;
@@ -34,7 +34,7 @@ pub fn tokens(text: &str) -> Result<Vec<Token<'_>>, SchemaError> {
             '=' if rest.starts_with("====") => to_line_end(rest),
             '"' => {
                 let length = quoted(rest, line)?;
-                tokens.push(Token {
+                tokens.push(SchemaToken {
                     text: &rest[1..length - 1],
                     is_quoted: true,
                     line,
@@ -43,7 +43,7 @@ pub fn tokens(text: &str) -> Result<Vec<Token<'_>>, SchemaError> {
             }
             _ => {
                 let length = word(rest);
-                tokens.push(Token {
+                tokens.push(SchemaToken {
                     text: &rest[..length],
                     is_quoted: false,
                     line,

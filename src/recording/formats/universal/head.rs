@@ -10,7 +10,7 @@ const HEAD_LINES: usize = 11;
 const TIME: i64 = 17;
 
 /// Header of a data set 58.
-pub(super) struct Head {
+pub(super) struct DatasetHead {
     pub(super) name: String,
     pub(super) function: i64,
     /// Data type: 2 single, 4 double, 5 and 6 the same for complex numbers.
@@ -20,10 +20,10 @@ pub(super) struct Head {
     pub(super) start: f64,
     pub(super) step: f64,
     /// Type and text of both axes: abscissa, ordinate.
-    pub(super) axes: [Axis; 2],
+    pub(super) axes: [Abscissa; 2],
 }
 
-pub(super) struct Axis {
+pub(super) struct Abscissa {
     pub(super) kind: i64,
     pub(super) label: String,
     pub(super) unit: String,
@@ -44,7 +44,7 @@ pub(super) fn text(line: &str, from: usize, width: usize) -> String {
     }
 }
 
-impl Axis {
+impl Abscissa {
     pub(super) fn of(line: &str) -> Self {
         Self {
             kind: field(line, 0, 10).unwrap_or(0),
@@ -54,7 +54,7 @@ impl Axis {
     }
 }
 
-impl Head {
+impl DatasetHead {
     pub(super) fn read(lines: &mut Lines) -> Result<Option<Self>, Failure> {
         let mut head = Vec::new();
         for _ in 0..HEAD_LINES {
@@ -77,7 +77,7 @@ impl Head {
             return Err(lines
                 .wrong("the seventh line of a data set 58 does not contain the required numbers"));
         };
-        let [abscissa, ordinate] = [&head[7], &head[8]].map(|line| Axis::of(line));
+        let [abscissa, ordinate] = [&head[7], &head[8]].map(|line| Abscissa::of(line));
         Ok(Some(Self {
             name: name(&head, &ordinate),
             function: field(&head[5], 0, 5).unwrap_or(0),
@@ -123,7 +123,7 @@ impl Head {
 }
 
 /// Name of a function: its first line, otherwise node and direction, otherwise the label of its axis.
-pub(super) fn name(head: &[String], ordinate: &Axis) -> String {
+pub(super) fn name(head: &[String], ordinate: &Abscissa) -> String {
     let identified = text(&head[0], 0, 80);
     let response = text(&head[5], 31, 10);
     let node: Option<i64> = field(&head[5], 41, 10);

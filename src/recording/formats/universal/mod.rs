@@ -8,7 +8,7 @@ mod lines;
 
 use std::collections::{HashMap, HashSet};
 
-use self::head::{Head, field};
+use self::head::{DatasetHead, field};
 use self::lines::{Lines, numbers_of};
 use torqcomp_decimal::digits;
 
@@ -140,7 +140,7 @@ fn data_set(
     content: &mut Content,
     (left_out, labels): (&mut Vec<String>, &mut Vec<String>),
 ) -> Result<bool, Failure> {
-    let Some(head) = Head::read(lines)? else {
+    let Some(head) = DatasetHead::read(lines)? else {
         content.lost = Some(cut("within the header of a data set"));
         return Ok(false);
     };
@@ -187,7 +187,7 @@ fn data_set(
 }
 
 /// The numbers of a text data set, as many as the file contains, and the line after them.
-fn text_values(lines: &mut Lines, wanted: usize, head: &Head) -> Result<Vec<f64>, Failure> {
+fn text_values(lines: &mut Lines, wanted: usize, head: &DatasetHead) -> Result<Vec<f64>, Failure> {
     let widths: &[usize] = match (head.kind, head.is_even) {
         (2 | 5, _) => &[13],
         (4, false) => &[13, 20],
@@ -224,7 +224,7 @@ fn roundest_rate(step: f64) -> f64 {
 }
 
 /// The channel of a data set.
-fn made(head: &Head, name: &str, values: &[f64], lines: &Lines) -> Result<Channel, Failure> {
+fn made(head: &DatasetHead, name: &str, values: &[f64], lines: &Lines) -> Result<Channel, Failure> {
     let [abscissa, ordinate] = &head.axes;
     // The standard prescribes seconds; another unit of time is accepted as written.
     let unit = NamedUnit::parse(&abscissa.unit).filter(NamedUnit::is_time);

@@ -2,7 +2,7 @@
 
 use super::{SAME, Sources};
 use crate::print::short;
-use crate::recording::text::keys::{self, Entry, Topic};
+use crate::recording::text::keys::{self, HeaderEntry, Topic};
 
 /// Intervals from which on a number without a unit may be in milliseconds.
 const LONG_S: f64 = 0.1;
@@ -11,7 +11,7 @@ impl Sources<'_> {
     /// Header rate for a column (or for all), and the words that give it.
     pub(super) fn header_rate(&self, place: Option<usize>) -> Option<(String, f64)> {
         // The frequency of a signal may precede the rate.
-        let is_vague = |entry: &&Entry| keys::is_vague(&entry.key);
+        let is_vague = |entry: &&HeaderEntry| keys::is_vague(&entry.key);
         let clear = self.entries.iter().filter(|entry| !is_vague(entry));
         clear
             .chain(self.entries.iter().filter(is_vague))

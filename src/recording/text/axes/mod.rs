@@ -12,7 +12,7 @@ use std::sync::Arc;
 use torqcomp_dsp::quality::rounding::rounded;
 
 use super::header::Field;
-use super::keys::{self, Entry};
+use super::keys::{self, HeaderEntry};
 use super::rows::{Column, ColumnKind};
 use super::vocabulary::has;
 use crate::failure::Failure;
@@ -81,7 +81,7 @@ pub struct Sources<'a> {
     /// Values in the first rows.
     pub columns: &'a [Column],
     /// Header entries.
-    pub entries: &'a [Entry],
+    pub entries: &'a [HeaderEntry],
     /// Decimal mark of the header.
     pub decimal: u8,
     /// Unit of time for makers whose files never name it.
@@ -251,7 +251,7 @@ impl Sources<'_> {
     fn header_start(&self) -> Option<f64> {
         // A bare "Start" may count samples, as in Keysight's Infiniium, which has it next to
         // "XOrg".
-        let is_bare = |entry: &&keys::Entry| {
+        let is_bare = |entry: &&keys::HeaderEntry| {
             entry
                 .key
                 .trim_end_matches(':')

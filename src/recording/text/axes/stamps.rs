@@ -32,7 +32,7 @@ pub struct StampRule {
     /// Whether they are times of day, which restart at midnight.
     pub is_time_of_day: bool,
     /// The column with the fractional seconds of each stamp, if separate.
-    pub parts: Option<Parts>,
+    pub parts: Option<FractionColumn>,
     /// Whether each value is the time since the preceding row.
     pub is_sum: bool,
     /// Date and time of the first one as written.
@@ -43,7 +43,7 @@ pub struct StampRule {
 
 /// A column with fractional seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Parts {
+pub struct FractionColumn {
     /// Index of the column.
     pub place: usize,
     /// Seconds per unit of its values.
@@ -165,7 +165,7 @@ impl Sources<'_> {
         let beside = group.times.iter().copied().find(|p| *p == place + 1);
         let parts = beside
             .filter(|p| !self.is_clock(*p))
-            .map(|beside| Parts {
+            .map(|beside| FractionColumn {
                 place: beside,
                 seconds_per_unit: self.own_seconds(beside).unwrap_or(1e-3),
                 whole: 0.0,
@@ -217,7 +217,7 @@ impl Sources<'_> {
     }
 
     /// The fraction of a column of whole seconds, in the adjacent column.
-    pub(super) fn parts_of(&self, place: usize) -> Option<Parts> {
+    pub(super) fn parts_of(&self, place: usize) -> Option<FractionColumn> {
         let seconds_of_name = |place: usize| {
             let field = self.fields.get(place)?;
             let unit = field.unit.as_ref().filter(|_| field.is_named_time())?;
@@ -233,7 +233,7 @@ impl Sources<'_> {
         let whole = *numbers(place).first()?;
         let beside = [Some(place + 1), place.checked_sub(1)];
         let known = beside.into_iter().flatten().find_map(|beside| {
-            let parts = Parts {
+            let parts = FractionColumn {
                 place: beside,
                 seconds_per_unit: seconds_of(beside).filter(|seconds| *seconds < 1e-2)?,
                 whole,

@@ -1,14 +1,14 @@
 //! Names and units from keys and values above a table.
 
-use super::Row;
+use super::HeaderRow;
 use super::field::{Field, without_name};
 use super::labelled::is_name_label;
-use crate::recording::text::keys::{Entry, Topic, topic};
+use crate::recording::text::keys::{HeaderEntry, Topic, topic};
 use crate::recording::text::units;
 use crate::unit::NamedUnit;
 
 /// Names from a line such as `Source,CH1`, if no line above the table has them.
-pub(super) fn fill_names(fields: &mut [Field], entries: &[Entry], used: &[bool]) {
+pub(super) fn fill_names(fields: &mut [Field], entries: &[HeaderEntry], used: &[bool]) {
     let places: Vec<usize> = (0..fields.len()).filter(|place| used[*place]).collect();
     let about = entries
         .iter()
@@ -30,7 +30,7 @@ pub(super) fn fill_names(fields: &mut [Field], entries: &[Entry], used: &[bool])
 }
 
 /// Units from lines such as `Vertical Units,V,V`: one per column, or one for all.
-pub(super) fn fill_units(fields: &mut [Field], entries: &[Entry], used: &[bool]) {
+pub(super) fn fill_units(fields: &mut [Field], entries: &[HeaderEntry], used: &[bool]) {
     let signals: Vec<usize> = (0..fields.len())
         .filter(|place| used[*place])
         .filter(|place| {
@@ -82,11 +82,11 @@ fn of_channels(value: &str) -> Vec<&str> {
 }
 
 /// The unit of the horizontal axis from a line such as `Horizontal Units,s`.
-pub(super) fn fill_axis_unit(fields: &mut [Field], entries: &[Entry]) {
+pub(super) fn fill_axis_unit(fields: &mut [Field], entries: &[HeaderEntry]) {
     let entry = entries
         .iter()
         .find(|entry| entry.topic() == Some(Topic::AxisUnit));
-    if let Some(text) = entry.and_then(Entry::value) {
+    if let Some(text) = entry.and_then(HeaderEntry::value) {
         let axis = fields
             .iter_mut()
             .find(|field| field.is_named_time() || units::is_axis_name(&field.name));
@@ -120,8 +120,8 @@ fn above<'a>(values: &'a [String], fields: &[Field], place: usize) -> &'a str {
 
 /// Units, and the rate if it is common to all, from a list of channels such as
 /// `Channel,Unit,Length,Increment` above `Force,N,300,0.001`.
-pub(super) fn fill_from_list(fields: &mut [Field], rows: &[Row]) -> Vec<Entry> {
-    let is_heading = |row: &Row| {
+pub(super) fn fill_from_list(fields: &mut [Field], rows: &[HeaderRow]) -> Vec<HeaderEntry> {
+    let is_heading = |row: &HeaderRow| {
         is_name_label(&row.cells[0])
             && row
                 .cells
@@ -133,7 +133,7 @@ pub(super) fn fill_from_list(fields: &mut [Field], rows: &[Row]) -> Vec<Entry> {
         return Vec::new();
     };
     let labels = &rows[heading].cells;
-    let mut rates: Vec<Entry> = Vec::new();
+    let mut rates: Vec<HeaderEntry> = Vec::new();
     for (row, after) in rows[heading + 1..].iter().zip(1..) {
         let field = fields.iter_mut().find(|field| field.name == row.cells[0]);
         let Some(field) = field.filter(|_| row.line == rows[heading].line + after) else {
@@ -142,7 +142,7 @@ pub(super) fn fill_from_list(fields: &mut [Field], rows: &[Row]) -> Vec<Entry> {
         for (label, cell) in labels.iter().zip(&row.cells).skip(1) {
             match topic(label) {
                 Some(Topic::Unit) => set_unit(field, cell),
-                Some(Topic::Rate | Topic::Interval) => rates.push(Entry {
+                Some(Topic::Rate | Topic::Interval) => rates.push(HeaderEntry {
                     line: row.line,
                     key: label.clone(),
                     values: vec![cell.clone()],
@@ -152,7 +152,7 @@ pub(super) fn fill_from_list(fields: &mut [Field], rows: &[Row]) -> Vec<Entry> {
             }
         }
     }
-    let said = |entry: &Entry| (entry.key.clone(), entry.values.clone());
+    let said = |entry: &HeaderEntry| (entry.key.clone(), entry.values.clone());
     let is_same = rates
         .windows(2)
         .all(|pair| said(&pair[0]) == said(&pair[1]));

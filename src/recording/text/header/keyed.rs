@@ -1,7 +1,7 @@
 //! Detection of rows above a table that are keys with values rather than headings.
 
 use super::positional::is_units;
-use super::{Field, Row, after_definition};
+use super::{Field, HeaderRow, after_definition};
 use crate::recording::text::cell::Cell;
 use crate::recording::text::keys::{self, Topic};
 use crate::recording::text::units;
@@ -18,7 +18,7 @@ pub(super) fn repeats_a_key(cells: &[String]) -> bool {
 }
 
 /// Rows of one key and value each above a table of two columns are not headings.
-pub(super) fn is_key_block(fitting: &[&Row], used: &[bool]) -> bool {
+pub(super) fn is_key_block(fitting: &[&HeaderRow], used: &[bool]) -> bool {
     let two = used.iter().filter(|used| **used).count() == 2;
     let Some(nearest) = fitting.first() else {
         return false;

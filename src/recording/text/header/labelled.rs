@@ -1,6 +1,6 @@
 //! Headers whose rows are labelled in the first column.
 
-use super::Row;
+use super::HeaderRow;
 use super::field::Field;
 use super::positional::is_nothing_but_units;
 use crate::recording::text::keys::{self, Topic};
@@ -19,21 +19,21 @@ pub(super) fn is_name_label(cell: &str) -> bool {
 
 /// A header with row labels in the first column (repeated above every further time column): the
 /// columns, and the line of the names.
-pub(super) fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize)> {
+pub(super) fn labelled(rows: &[HeaderRow], used: &[bool]) -> Option<(Vec<Field>, usize)> {
     let names = rows
         .iter()
         .rev()
         .filter(|row| is_wide(row, used.len()))
         .find(|row| is_name_label(&row.cells[0]))?;
     let block = block_around(rows, names.line);
-    let others: Vec<&Row> = rows
+    let others: Vec<&HeaderRow> = rows
         .iter()
         .filter(|row| row.line != names.line && block.contains(&row.line))
         .filter(|row| row.cells.len() > 1 && !row.cells[0].is_empty())
         .filter(|row| row.cells.len() + 1 >= used.len())
         .collect();
     let about = |topic: Topic| {
-        let key = |row: &&&Row| row.cells[0].trim_end_matches([':', '=']).trim().to_owned();
+        let key = |row: &&&HeaderRow| row.cells[0].trim_end_matches([':', '=']).trim().to_owned();
         others
             .iter()
             .find(|row| keys::topic(&key(row)) == Some(topic))
@@ -69,7 +69,7 @@ pub(super) fn labelled(rows: &[Row], used: &[bool]) -> Option<(Vec<Field>, usize
 
 /// Whether a line is the last above the data and separated from the rest by an empty one, so that
 /// it is not a key among others.
-fn is_last_and_apart(rows: &[Row], line: usize) -> bool {
+fn is_last_and_apart(rows: &[HeaderRow], line: usize) -> bool {
     let [.., above, last] = rows else {
         return false;
     };
@@ -88,7 +88,7 @@ fn is_headings(cells: &[String]) -> bool {
 }
 
 /// Whether most columns have a cell, none of them between a key and its value.
-fn is_wide(row: &Row, columns: usize) -> bool {
+fn is_wide(row: &HeaderRow, columns: usize) -> bool {
     let filled = row.cells.iter().filter(|cell| !cell.is_empty()).count();
     row.cells.len() >= columns
         && filled > 1
@@ -97,16 +97,16 @@ fn is_wide(row: &Row, columns: usize) -> bool {
 }
 
 /// Whether the data rows have no cell under the labels, so that the names begin one cell later.
-fn is_beside_data(names: &Row, used: &[bool]) -> bool {
+fn is_beside_data(names: &HeaderRow, used: &[bool]) -> bool {
     let filled = names.cells.iter().filter(|cell| !cell.is_empty()).count();
     filled == used.len() + 1 && names.cells.len() >= filled && used.iter().all(|used| *used)
 }
 
-fn cell<'a>(row: Option<&'a Row>, place: usize) -> Option<&'a str> {
+fn cell<'a>(row: Option<&'a HeaderRow>, place: usize) -> Option<&'a str> {
     row?.cells.get(place).map(String::as_str)
 }
 
-fn fields_beside(names: &Row, units: Option<&Row>, columns: usize) -> Vec<Field> {
+fn fields_beside(names: &HeaderRow, units: Option<&HeaderRow>, columns: usize) -> Vec<Field> {
     (1..=columns)
         .map(|place| match cell(units, place) {
             Some(unit) => Field::with_unit(&names.cells[place], Some(unit)),
@@ -117,14 +117,14 @@ fn fields_beside(names: &Row, units: Option<&Row>, columns: usize) -> Vec<Field>
 
 /// Columns under their names. `under` are units just above the data, if any.
 fn fields_below(
-    names: &Row,
-    units: Option<&Row>,
-    under: Option<&Row>,
-    others: &[&Row],
+    names: &HeaderRow,
+    units: Option<&HeaderRow>,
+    under: Option<&HeaderRow>,
+    others: &[&HeaderRow],
     used: &[bool],
 ) -> Vec<Field> {
     let is_label = |place: usize| {
-        let repeats = |row: &Row| row.cells.get(place) == row.cells.first();
+        let repeats = |row: &HeaderRow| row.cells.get(place) == row.cells.first();
         repeats(names)
             && others
                 .iter()
@@ -138,7 +138,7 @@ fn fields_below(
         }
     };
     // The first column may have its own heading below: `Time [ms]`.
-    let is_heading = |row: &&&Row| row.cells[1..].iter().all(String::is_empty);
+    let is_heading = |row: &&&HeaderRow| row.cells[1..].iter().all(String::is_empty);
     let time = others
         .iter()
         .filter(is_heading)
@@ -168,7 +168,7 @@ fn fields_below(
 }
 
 /// The lines adjacent to one without an empty line between.
-fn block_around(rows: &[Row], line: usize) -> std::ops::RangeInclusive<usize> {
+fn block_around(rows: &[HeaderRow], line: usize) -> std::ops::RangeInclusive<usize> {
     let (mut first, mut last) = (line, line);
     for row in rows {
         if row.line == last + 1 {

@@ -7,7 +7,7 @@ mod labelled;
 mod positional;
 
 use super::head::{Head, Table};
-use super::keys::{self, Entry};
+use super::keys::{self, HeaderEntry};
 use super::units;
 use crate::recording::text::dialect::{Delimiter, Dialect};
 pub use field::Field;
@@ -21,7 +21,7 @@ pub struct Header {
     /// The columns.
     pub fields: Vec<Field>,
     /// The keys and values.
-    pub entries: Vec<Entry>,
+    pub entries: Vec<HeaderEntry>,
     /// Text of the line with the names.
     pub names: Option<String>,
     /// Number of a line just above the table with more words than there are columns, none of which has a name then.
@@ -45,7 +45,7 @@ impl Header {
 }
 
 /// A line above the table, split into cells.
-struct Row<'a> {
+struct HeaderRow<'a> {
     line: usize,
     text: &'a str,
     cells: Vec<String>,
@@ -53,11 +53,11 @@ struct Row<'a> {
 
 /// Parses the lines above a table; `used` marks the columns with data in the first rows.
 pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
-    let rows: Vec<Row> = head.lines[..table.first]
+    let rows: Vec<HeaderRow> = head.lines[..table.first]
         .iter()
         .enumerate()
         .filter(|(_, line)| line.text.chars().any(char::is_alphanumeric))
-        .map(|(line, content)| Row {
+        .map(|(line, content)| HeaderRow {
             line,
             text: &content.text,
             cells: match lone_heading(head, table, line) {
@@ -66,7 +66,7 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
             },
         })
         .collect();
-    let entries = |without: &[usize]| -> Vec<Entry> {
+    let entries = |without: &[usize]| -> Vec<HeaderEntry> {
         rows.iter()
             // `CH1V,CH2V,t0 =-5e-05, tInc = 1e-09,` names columns and contains further entries.
             .filter(|row| !without.contains(&row.line) || row.text.contains('='))
@@ -74,7 +74,7 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
             .collect()
     };
     let keyed = entries_below_keys(head, &rows);
-    let entries = |without: &[usize]| -> Vec<Entry> {
+    let entries = |without: &[usize]| -> Vec<HeaderEntry> {
         let mut all = entries(without);
         all.extend(keyed.iter().cloned());
         all
@@ -115,14 +115,14 @@ pub fn read(head: &Head, table: &Table, used: &[bool]) -> Header {
 }
 
 /// Keys in one line with their values in the next: `dt:` above `0.001`, `*RATE` above `500 Hz`.
-fn entries_below_keys(head: &Head, rows: &[Row]) -> Vec<Entry> {
+fn entries_below_keys(head: &Head, rows: &[HeaderRow]) -> Vec<HeaderEntry> {
     rows.windows(2)
         .filter(|pair| pair[1].line == pair[0].line + 1)
         .filter_map(|pair| {
             let text = pair[0].text.trim();
             let starred = || text.strip_prefix('*').filter(|key| is_about_axis(key));
             let key = text.strip_suffix(':').or_else(starred)?;
-            Some(Entry {
+            Some(HeaderEntry {
                 line: head.number(pair[0].line),
                 key: key.to_owned(),
                 values: pair[1].cells.clone(),

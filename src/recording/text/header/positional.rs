@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use super::field::Field;
 use super::keyed::{is_key_block, is_key_with_values, is_list_of_quantities, repeats_a_key};
-use super::{Row, WORDS, is_split_at_words};
+use super::{HeaderRow, WORDS, is_split_at_words};
 use crate::recording::text::cell::Cell;
 use crate::recording::text::head::Table;
 use crate::recording::text::units;
@@ -21,9 +21,9 @@ pub(super) struct Positional {
     pub(super) names: Option<usize>,
 }
 
-pub(super) fn positional(rows: &[Row], table: &Table, used: &[bool]) -> Positional {
+pub(super) fn positional(rows: &[HeaderRow], table: &Table, used: &[bool]) -> Positional {
     let near = rows.len().saturating_sub(LINES_FOR_HEADINGS);
-    let fitting: Vec<&Row> = rows[near..]
+    let fitting: Vec<&HeaderRow> = rows[near..]
         .iter()
         .filter(|row| is_heading(&row.cells, table, used) && !is_split_at_words(&row.cells, table))
         .filter(|row| !is_process_row(&row.cells) && !repeats_a_key(&row.cells))
@@ -82,17 +82,17 @@ impl Positional {
 
 /// The rows above the data by content.
 struct Headings<'a> {
-    names: &'a Row<'a>,
-    units: Option<&'a Row<'a>>,
+    names: &'a HeaderRow<'a>,
+    units: Option<&'a HeaderRow<'a>>,
     /// The row of units, if it contains remarks as well.
-    remarks: Option<&'a Row<'a>>,
+    remarks: Option<&'a HeaderRow<'a>>,
     /// Short symbols between the names and their units.
-    symbols: Option<&'a Row<'a>>,
+    symbols: Option<&'a HeaderRow<'a>>,
 }
 
 impl<'a> Headings<'a> {
     /// From the matching rows, lowest first.
-    fn of(fitting: &[&'a Row<'a>]) -> Option<Self> {
+    fn of(fitting: &[&'a HeaderRow<'a>]) -> Option<Self> {
         let fitting = above_remarks(fitting);
         let (names, units, remarks) = match fitting {
             [] => return None,
@@ -116,7 +116,7 @@ impl<'a> Headings<'a> {
     }
 
     /// A column; `upper` distinguishes columns of the same name.
-    fn field(&self, place: usize, upper: Option<&Row>) -> Field {
+    fn field(&self, place: usize, upper: Option<&HeaderRow>) -> Field {
         let Some(name) = filled(Some(self.names), place) else {
             return Field::unnamed(place);
         };
@@ -140,8 +140,8 @@ impl<'a> Headings<'a> {
 
 /// The rows starting with those that have time above its unit, if they are above rows of other
 /// kinds: `Time,Force` and `s,N` above the names of devices or their inputs.
-fn above_remarks<'a, 'b>(fitting: &'b [&'a Row<'a>]) -> &'b [&'a Row<'a>] {
-    let is_time_above_unit = |pair: &[&Row]| {
+fn above_remarks<'a, 'b>(fitting: &'b [&'a HeaderRow<'a>]) -> &'b [&'a HeaderRow<'a>] {
+    let is_time_above_unit = |pair: &[&HeaderRow]| {
         let (below, above) = (pair[0], pair[1]);
         let is_time = |(name, unit): (&String, &String)| {
             units::is_time_name(name) && units::read(unit).is_some_and(|unit| unit.is_time())
@@ -150,7 +150,7 @@ fn above_remarks<'a, 'b>(fitting: &'b [&'a Row<'a>]) -> &'b [&'a Row<'a>] {
             && is_units(&below.cells)
             && above.cells.iter().zip(&below.cells).any(is_time)
     };
-    let is_settled = |row: &Row| {
+    let is_settled = |row: &HeaderRow| {
         row.cells.iter().any(|cell| {
             let field = Field::new(cell, None);
             field.is_named_time() || field.has_time_unit()
@@ -163,13 +163,13 @@ fn above_remarks<'a, 'b>(fitting: &'b [&'a Row<'a>]) -> &'b [&'a Row<'a>] {
 }
 
 /// The text of a nonempty cell.
-fn filled<'a>(row: Option<&'a Row>, place: usize) -> Option<&'a str> {
+fn filled<'a>(row: Option<&'a HeaderRow>, place: usize) -> Option<&'a str> {
     let cell = row?.cells.get(place)?;
     (!cell.is_empty()).then_some(cell.as_str())
 }
 
 /// Whether a row contains the symbols of the names just above it: `t`, `F` below `Time`, `Force`.
-fn is_symbols_of(symbols: &Row, names: &Row) -> bool {
+fn is_symbols_of(symbols: &HeaderRow, names: &HeaderRow) -> bool {
     let is_name = |name: &String, symbol: &String| {
         symbol.chars().count() <= 3 && name.chars().count() > symbol.chars().count()
     };
@@ -224,7 +224,7 @@ fn is_heading(cells: &[String], table: &Table, used: &[bool]) -> bool {
 
 /// Whether a row under column names contains their units next to words that it repeats: `NO.`,
 /// `Time`, `ms`, `V`, `N` under `Number`, `Time`, `ms`, `CH1`, `CH2`.
-fn is_units_under(below: &Row, above: &Row) -> bool {
+fn is_units_under(below: &HeaderRow, above: &HeaderRow) -> bool {
     let pairs = || below.cells.iter().zip(&above.cells);
     let repeats_unit = pairs().any(|(below, above)| below == above && units::read(below).is_some());
     let says_more = |(below, above): &(&String, &String)| {
@@ -316,7 +316,7 @@ fn is_process_row(cells: &[String]) -> bool {
 }
 
 /// Whether a row numbers the channels of its cells: `Channel Data`, `CH 1`, `CH 2`.
-fn is_of_channels(row: &Row) -> bool {
+fn is_of_channels(row: &HeaderRow) -> bool {
     let counts = |cell: &String| cell.ends_with(|c: char| c.is_ascii_digit());
     row.cells.len() > 1 && row.cells[1..].iter().all(counts)
 }
@@ -328,8 +328,12 @@ fn all_differ<'a>(cells: impl IntoIterator<Item = &'a String>) -> bool {
 
 /// A row above the names that distinguishes columns of the same name: `CH 1`, `CH 2` above
 /// `Voltage`.
-fn upper_names<'a>(names: &Row, fitting: &[&'a Row<'a>], used: &[bool]) -> Option<&'a Row<'a>> {
-    let cells = |row: &Row| -> Vec<String> {
+fn upper_names<'a>(
+    names: &HeaderRow,
+    fitting: &[&'a HeaderRow<'a>],
+    used: &[bool],
+) -> Option<&'a HeaderRow<'a>> {
+    let cells = |row: &HeaderRow| -> Vec<String> {
         (1..used.len())
             .filter_map(|place| row.cells.get(place).cloned())
             .collect()

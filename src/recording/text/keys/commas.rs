@@ -1,10 +1,10 @@
 //! Rates and intervals cut at a comma within the number: `Sample Rate,10,000 Hz`.
 
-use super::{Entry, Topic};
+use super::{HeaderEntry, Topic};
 
 /// An entry whose first value is joined with the cells after it, if only this makes sense: `10`, `000` and `10`, `5 kHz`.
 /// `12`, `500` may also be two rates.
-pub(super) fn joined(mut entry: Entry) -> Entry {
+pub(super) fn joined(mut entry: HeaderEntry) -> HeaderEntry {
     if !matches!(entry.topic(), Some(Topic::Rate | Topic::Interval)) {
         return entry;
     }

@@ -10,7 +10,7 @@ pub use words::{is_of_others, is_thinning, is_vague, topic};
 
 /// A line with a key and values.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
+pub struct HeaderEntry {
     /// Number of the line in the file.
     pub line: usize,
     /// The key, without colon, equals sign and quotes.
@@ -59,7 +59,7 @@ impl Topic {
     }
 }
 
-impl Entry {
+impl HeaderEntry {
     /// Topic of its key.
     pub fn topic(&self) -> Option<Topic> {
         topic(&self.key)
@@ -75,7 +75,7 @@ impl Entry {
 }
 
 /// Entries of a line: one for its key and values, or one for each cell `key = value`.
-pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
+pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<HeaderEntry> {
     let text = text
         .trim()
         .trim_start_matches(['#', '%', '!', '*', ';', '/'])
@@ -89,7 +89,7 @@ pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
     }
     let (cells, mark) = split(text, dialect);
     // `CH1V,CH2V,t0 =-5e-05, tInc = 1e-09,`: separate cells.
-    let assignments: Vec<Entry> = cells
+    let assignments: Vec<HeaderEntry> = cells
         .iter()
         .filter_map(|cell| {
             let (key, value) = cell.split_once('=').or_else(|| cell.split_once(": "))?;
@@ -124,7 +124,7 @@ pub fn entries(line: usize, text: &str, dialect: Dialect) -> Vec<Entry> {
 }
 
 /// A rate or an interval without a key: `0.5 msec/sample`, `2000 samples/s`.
-fn bare_rate(line: usize, text: &str, decimal: u8) -> Option<Entry> {
+fn bare_rate(line: usize, text: &str, decimal: u8) -> Option<HeaderEntry> {
     let (_, unit) = quantity(text, decimal)?;
     let lower = unit.to_lowercase();
     let is_rate = lower.ends_with("sec/sample") || lower.starts_with("samples/s");
@@ -134,7 +134,7 @@ fn bare_rate(line: usize, text: &str, decimal: u8) -> Option<Entry> {
 
 /// A key and its value separated by the first colon or equals sign, before a comma that belongs to the
 /// value, as the table has another separator: `Date : 24.11.2011, 09:07:38`.
-fn before_comma(line: usize, text: &str, dialect: Dialect) -> Option<Entry> {
+fn before_comma(line: usize, text: &str, dialect: Dialect) -> Option<HeaderEntry> {
     let place = text.find([':', '='])?;
     let is_first = text.find(',').is_some_and(|comma| place < comma);
     if !is_first || dialect.delimiter == Delimiter::Byte(b',') || text.contains(['\t', ';']) {
@@ -146,7 +146,7 @@ fn before_comma(line: usize, text: &str, dialect: Dialect) -> Option<Entry> {
 }
 
 /// Whether the value is only a number, with or without a unit.
-fn is_quantity(entry: &Entry) -> bool {
+fn is_quantity(entry: &HeaderEntry) -> bool {
     let Some(text) = entry.value() else {
         return false;
     };
@@ -156,7 +156,7 @@ fn is_quantity(entry: &Entry) -> bool {
 }
 
 /// `Sampling Frequency - 5000`, `Date: 1.2.2024`, `T0 = 5`.
-fn one_cell(line: usize, text: &str) -> Option<Entry> {
+fn one_cell(line: usize, text: &str) -> Option<HeaderEntry> {
     let marks = ["=", ":", " - ", "\t"];
     let (key, value) = marks.iter().find_map(|mark| {
         let (key, value) = text.split_once(mark)?;
@@ -177,7 +177,7 @@ fn one_cell(line: usize, text: &str) -> Option<Entry> {
     )
 }
 
-fn entry(line: usize, key: &str, values: Vec<String>) -> Option<Entry> {
+fn entry(line: usize, key: &str, values: Vec<String>) -> Option<HeaderEntry> {
     let key = key
         .trim()
         .trim_matches('"')
@@ -185,7 +185,7 @@ fn entry(line: usize, key: &str, values: Vec<String>) -> Option<Entry> {
         .trim_end_matches([':', '=', ' '])
         .trim();
     let has_letters = key.chars().any(char::is_alphabetic);
-    (has_letters && key.chars().count() <= 80).then(|| Entry {
+    (has_letters && key.chars().count() <= 80).then(|| HeaderEntry {
         line,
         key: key.to_owned(),
         values: values

@@ -56,7 +56,7 @@ fn rates_and_intervals() {
 
 #[test]
 fn dates() {
-    let all = |lines: &[&str]| -> Vec<Entry> {
+    let all = |lines: &[&str]| -> Vec<HeaderEntry> {
         lines
             .iter()
             .flat_map(|line| entries(1, line, COMMA))

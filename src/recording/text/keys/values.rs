@@ -1,6 +1,6 @@
 //! Interpretation of values: rates, intervals, seconds, dates.
 
-use super::{Entry, Topic};
+use super::{HeaderEntry, Topic};
 use crate::recording::text::cell::Cell;
 use crate::recording::text::clock::Clock;
 use crate::recording::text::units;
@@ -66,7 +66,7 @@ fn hertz(value: f64, unit: &str, is_interval: bool) -> Option<f64> {
 }
 
 /// Rate in Hz from an entry, at an index among its values (otherwise from the first nonempty one).
-pub fn rate_hz(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> {
+pub fn rate_hz(entry: &HeaderEntry, place: Option<usize>, decimal: u8) -> Option<f64> {
     let is_interval = match entry.topic()? {
         Topic::Rate => false,
         Topic::Interval => true,
@@ -97,7 +97,7 @@ pub fn rate_hz(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> 
 }
 
 /// Whether a unit is given with the first value of an entry.
-pub fn has_unit(entry: &Entry, decimal: u8) -> bool {
+pub fn has_unit(entry: &HeaderEntry, decimal: u8) -> bool {
     let mut values = entry.values.iter().filter(|value| !value.is_empty());
     let own = values.next().and_then(|value| quantity(value, decimal));
     own.is_some_and(|(_, unit)| !unit.is_empty())
@@ -117,7 +117,7 @@ fn of_first_channel(value: &str) -> &str {
 }
 
 /// Seconds given by an entry.
-pub fn seconds(entry: &Entry, place: Option<usize>, decimal: u8) -> Option<f64> {
+pub fn seconds(entry: &HeaderEntry, place: Option<usize>, decimal: u8) -> Option<f64> {
     let text = match place {
         Some(place) => entry.values.get(place)?.as_str(),
         None => entry.value()?,
@@ -148,7 +148,7 @@ fn in_brackets(text: &str) -> Option<&str> {
 }
 
 /// Date and time of the record from the entries.
-pub fn date_text(entries: &[Entry]) -> Option<String> {
+pub fn date_text(entries: &[HeaderEntry]) -> Option<String> {
     let (mut date, mut time) = (None, None);
     for entry in entries {
         let about = entry.key.to_lowercase();

@@ -33,7 +33,7 @@ pub const ALL: &[Rule] = &[
 
 /// Location of the sample times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Stamps {
+enum LvmStamps {
     No,
     One,
     Multi,
@@ -42,13 +42,13 @@ enum Stamps {
 /// Content of the file header.
 struct File {
     dialect: Dialect,
-    stamps: Stamps,
+    stamps: LvmStamps,
     details: Vec<(String, String)>,
 }
 
 /// Content of a segment header, one value per channel.
 #[derive(Default)]
-struct Header {
+struct LvmHeader {
     channels: usize,
     samples: Vec<String>,
     dates: Vec<String>,
@@ -160,7 +160,7 @@ impl Cursor<'_> {
 fn file_header(lines: &mut Cursor, reading: &Reading) -> File {
     let mut separator = b'\t';
     let mut decimal = None;
-    let mut stamps = Stamps::No;
+    let mut stamps = LvmStamps::No;
     let mut details = Vec::new();
     let start = (lines.at, lines.number);
     while let Some(line) = lines.next() {
@@ -179,8 +179,8 @@ fn file_header(lines: &mut Cursor, reading: &Reading) -> File {
             "Separator" if value.starts_with("Comma") => separator = b',',
             "Separator" if value.starts_with("Semicolon") => separator = b';',
             "Decimal_Separator" => decimal = value.bytes().next(),
-            "X_Columns" if value.starts_with("One") => stamps = Stamps::One,
-            "X_Columns" if value.starts_with("Multi") => stamps = Stamps::Multi,
+            "X_Columns" if value.starts_with("One") => stamps = LvmStamps::One,
+            "X_Columns" if value.starts_with("Multi") => stamps = LvmStamps::Multi,
             _ => {}
         }
         let value = value.trim_end_matches(',').trim();
@@ -206,8 +206,8 @@ fn file_header(lines: &mut Cursor, reading: &Reading) -> File {
     }
 }
 
-fn segment_header(lines: &mut Cursor, file: &File) -> Header {
-    let mut header = Header::default();
+fn segment_header(lines: &mut Cursor, file: &File) -> LvmHeader {
+    let mut header = LvmHeader::default();
     while let Some(line) = lines.next() {
         if line.starts_with(END) {
             break;
@@ -217,8 +217,8 @@ fn segment_header(lines: &mut Cursor, file: &File) -> Header {
         // With a time column for each channel, the values are above the channels only; otherwise an
         // empty cell means a channel without a value.
         let values: Vec<String> = match file.stamps {
-            Stamps::Multi => cells.filter(|cell| !cell.is_empty()).collect(),
-            Stamps::No | Stamps::One => cells.collect(),
+            LvmStamps::Multi => cells.filter(|cell| !cell.is_empty()).collect(),
+            LvmStamps::No | LvmStamps::One => cells.collect(),
         };
         match key.as_str() {
             "Channels" => {
@@ -254,7 +254,7 @@ fn joined(dates: &[String], times: &[String], place: usize) -> Option<String> {
 fn segment_channels(
     lines: &mut Cursor,
     file: &File,
-    header: &Header,
+    header: &LvmHeader,
     names: &str,
     reading: &Reading,
     recording: &mut Recording,
@@ -275,8 +275,8 @@ fn segment_channels(
     }
     for place in 0..count {
         let (time, value) = match file.stamps {
-            Stamps::Multi => (2 * place, 2 * place + 1),
-            Stamps::No | Stamps::One => (0, 1 + place),
+            LvmStamps::Multi => (2 * place, 2 * place + 1),
+            LvmStamps::No | LvmStamps::One => (0, 1 + place),
         };
         let unit = of(&header.units, place);
         let field = of(&names, value).map_or_else(
@@ -297,14 +297,14 @@ fn segment_channels(
 }
 
 /// Number of channels: there may be more names than the header counts, excluding the comments.
-fn count(file: &File, header: &Header, names: &[String]) -> usize {
+fn count(file: &File, header: &LvmHeader, names: &[String]) -> usize {
     let named = names
         .iter()
         .skip(1)
         .filter(|name| !name.is_empty() && *name != "Comment")
         .count();
     match file.stamps {
-        Stamps::Multi if named > 1 => header.channels.max(1).min(named),
+        LvmStamps::Multi if named > 1 => header.channels.max(1).min(named),
         _ => header.channels.max(1).min(named.max(1)),
     }
 }
@@ -312,8 +312,8 @@ fn count(file: &File, header: &Header, names: &[String]) -> usize {
 /// Reads the columns of a segment; a remark may be in the column after the last channel.
 fn columns(lines: &mut Cursor, file: &File, count: usize) -> Result<Vec<Column>, Failure> {
     let numbers = match file.stamps {
-        Stamps::Multi => 0..2 * count,
-        Stamps::No | Stamps::One => 0..1 + count,
+        LvmStamps::Multi => 0..2 * count,
+        LvmStamps::No | LvmStamps::One => 0..1 + count,
     };
     let text = &lines.text[lines.at.min(lines.text.len())..];
     let marks = &["Channels", "***"];
@@ -323,7 +323,13 @@ fn columns(lines: &mut Cursor, file: &File, count: usize) -> Result<Vec<Column>,
     Ok(read.columns)
 }
 
-fn axis(file: &File, header: &Header, place: usize, times: &Column, reading: &Reading) -> TimeAxis {
+fn axis(
+    file: &File,
+    header: &LvmHeader,
+    place: usize,
+    times: &Column,
+    reading: &Reading,
+) -> TimeAxis {
     let number = |values: &[String]| {
         // A single value for all channels is the first one.
         let text = of(values, place).or_else(|| of(values, 0))?;
@@ -336,7 +342,7 @@ fn axis(file: &File, header: &Header, place: usize, times: &Column, reading: &Re
     let is_time = other_dimension(header, place).is_none();
     let mut axis = if !is_time {
         TimeAxis::default()
-    } else if file.stamps != Stamps::No || !times.values.is_empty() {
+    } else if file.stamps != LvmStamps::No || !times.values.is_empty() {
         TimeAxis::of_stamps("X_Value", Arc::new(times.values.clone()))
     } else {
         header_hz.map_or_else(TimeAxis::default, |hz| {
@@ -351,14 +357,14 @@ fn axis(file: &File, header: &Header, place: usize, times: &Column, reading: &Re
 }
 
 /// Quantity of a channel's horizontal axis, if it is not time: `Frequency`.
-fn other_dimension(header: &Header, place: usize) -> Option<&str> {
+fn other_dimension(header: &LvmHeader, place: usize) -> Option<&str> {
     of(&header.dimensions, place).filter(|dimension| !dimension.starts_with("Time"))
 }
 
 /// The horizontal axis as a channel, with a warning, if it is not time.
-fn no_time(file: &File, header: &Header, values: &Column) -> Option<(Option<Channel>, Warning)> {
+fn no_time(file: &File, header: &LvmHeader, values: &Column) -> Option<(Option<Channel>, Warning)> {
     let dimension = other_dimension(header, 0)?;
-    let is_there = file.stamps == Stamps::One && !values.values.is_empty();
+    let is_there = file.stamps == LvmStamps::One && !values.values.is_empty();
     let field = Field::new(dimension, None);
     let axis = is_there.then(|| channel(&field, values.clone(), TimeAxis::default()));
     let warning = WarningCode::NoTimeAxis.warning(format!(
@@ -368,7 +374,7 @@ fn no_time(file: &File, header: &Header, values: &Column) -> Option<(Option<Chan
 }
 
 /// A warning if the header announces more samples than there are.
-fn missing(header: &Header, place: usize, field: &Field, column: &Column) -> Option<Warning> {
+fn missing(header: &LvmHeader, place: usize, field: &Field, column: &Column) -> Option<Warning> {
     let said: usize = of(&header.samples, place)?.parse().ok()?;
     (said > column.values.len()).then(|| {
         WarningCode::SamplesMissing.warning(format!(

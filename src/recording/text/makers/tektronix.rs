@@ -13,7 +13,7 @@ use crate::recording::text::chunks::Chunks;
 use crate::recording::text::dialect::{Delimiter, Dialect};
 use crate::recording::text::head::Head;
 use crate::recording::text::header::Field;
-use crate::recording::text::keys::{self, Entry, Topic};
+use crate::recording::text::keys::{self, HeaderEntry, Topic};
 use crate::recording::text::rows;
 use crate::recording::text::table::channel;
 use crate::recording::text::{FOR_MAKER, details, units};
@@ -114,14 +114,14 @@ fn read(chunks: &mut Chunks, reading: &Reading) -> Result<Recording, Failure> {
     Ok(recording)
 }
 
-fn entries(head: &Head, dialect: Dialect, place: usize) -> Vec<Entry> {
+fn entries(head: &Head, dialect: Dialect, place: usize) -> Vec<HeaderEntry> {
     head.lines
         .iter()
         .enumerate()
         .filter_map(|(line, content)| {
             let cells = dialect.cells(&content.text);
             let key = cells.get(place).filter(|key| !key.is_empty())?;
-            Some(Entry {
+            Some(HeaderEntry {
                 line: head.number(line),
                 key: key.clone(),
                 values: cells.get(place + 1..(place + 3).min(cells.len()))?.to_vec(),
@@ -131,12 +131,12 @@ fn entries(head: &Head, dialect: Dialect, place: usize) -> Vec<Entry> {
         .collect()
 }
 
-fn axis(entries: &[Entry], stamps: Vec<f64>, reading: &Reading) -> TimeAxis {
+fn axis(entries: &[HeaderEntry], stamps: Vec<f64>, reading: &Reading) -> TimeAxis {
     let unit = entries
         .iter()
         .find(|entry| entry.topic() == Some(Topic::AxisUnit));
     let factor = unit
-        .and_then(Entry::value)
+        .and_then(HeaderEntry::value)
         .and_then(units::read)
         .filter(NamedUnit::is_time)
         .map_or(1.0, |unit| unit.unit.factor());

@@ -2,7 +2,7 @@
 
 use super::Layout;
 use crate::print::plural;
-use crate::recording::text::keys::{Entry, Topic, quantity};
+use crate::recording::text::keys::{HeaderEntry, Topic, quantity};
 use crate::recording::text::rows::LineNotes;
 use crate::recording::text::vocabulary::has;
 use crate::warning::{Warning, WarningCode};
@@ -47,7 +47,7 @@ impl Layout {
         let is_scale = |text: &String| {
             quantity(text, decimal).is_some_and(|(factor, _)| factor != 1.0 && factor != 0.0)
         };
-        let is_factor = |entry: &&Entry| {
+        let is_factor = |entry: &&HeaderEntry| {
             let letters = entry
                 .key
                 .to_lowercase()
