@@ -168,15 +168,8 @@ impl ChannelStream {
     ) -> (Box<dyn BlockSource>, Option<ChannelPlan>, StreamValidator) {
         self.blocks.set_fewest(fewest);
         let plan = self.text.as_ref().map(|text| text.plan.clone());
-        let validator = StreamValidator::new(
-            self.source,
-            self.blocks.row_kind(),
-            self.text,
-            self.channel.axis,
-            self.warnings,
-            self.any_steps,
-        );
-        (self.blocks, plan, validator)
+        let (blocks, validator) = StreamValidator::of(self);
+        (blocks, plan, validator)
     }
 }
 

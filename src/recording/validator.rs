@@ -6,6 +6,7 @@ use super::TimeAxis;
 use super::block::{Block, BlockSource};
 use super::joined::JoinedBreaks;
 use super::stamps::IrregularStep;
+use super::stream::ChannelStream;
 use super::text::{ChannelPlan, Layout, LineNotes, Problem, is_end_of_data};
 use crate::failure::{ErrorCode, ErrorPlace, Failure, RowKind};
 use crate::print::plural;
@@ -77,29 +78,25 @@ impl StreamSummary {
 }
 
 impl StreamValidator {
-    pub(super) fn new(
-        source: String,
-        row_kind: RowKind,
-        text: Option<TextLines>,
-        time: TimeAxis,
-        warnings: Vec<Warning>,
-        any_steps: bool,
-    ) -> Self {
-        Self {
-            source,
-            row_kind,
-            lines: text.as_ref().map_or(0, |text| text.layout.line - 1),
-            text,
-            time,
+    /// The blocks of a stream, and what examines them.
+    pub(super) fn of(stream: ChannelStream) -> (Box<dyn BlockSource>, Self) {
+        let lines = stream.text.as_ref().map(|text| text.layout.line - 1);
+        let validator = Self {
+            source: stream.source,
+            row_kind: stream.blocks.row_kind(),
+            text: stream.text,
+            time: stream.channel.axis,
+            lines: lines.unwrap_or(0),
             samples: 0,
             first_stamp: None,
             last_stamp: None,
             empty_line: None,
             lost: None,
-            warnings,
+            warnings: stream.warnings,
             joined: JoinedBreaks::default(),
-            any_steps,
-        }
+            any_steps: stream.any_steps,
+        };
+        (stream.blocks, validator)
     }
 
     /// Examines the next block.
