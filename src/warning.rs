@@ -28,7 +28,7 @@ macro_rules! codes {
         /// What a warning is about.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub enum WarningCode {
-            $($(#[doc = $meaning] $name,)*)*
+            $($(#[doc = concat!("`", $code, "`")] $name,)*)*
         }
 
         impl WarningCode {

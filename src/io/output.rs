@@ -126,7 +126,7 @@ impl Output {
     /// Writes bytes.
     ///
     /// # Errors
-    /// [`Failure::ClosedPipe`] if the reader has gone, or a failure that names the output.
+    /// `Failure::ClosedPipe` if the reader has gone, or a failure that names the output.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), Failure> {
         let written = self.write_all(bytes);
         written.map_err(|error| Failure::writing(&self.name, &error))

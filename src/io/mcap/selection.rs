@@ -30,7 +30,7 @@ impl FieldChoice {
     /// Checks the selection as far as possible without the file.
     ///
     /// # Errors
-    /// [`Failure::Usage`] if the selection contradicts itself or is malformed.
+    /// `Failure::Usage` if the selection contradicts itself or is malformed.
     pub fn check(&self) -> Result<FieldRequest, Failure> {
         let field = self.field.as_deref().unwrap_or("");
         match (&self.signal, &self.topic) {
