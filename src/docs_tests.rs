@@ -339,7 +339,7 @@ fn sources(folder: &Path, all: &mut String) {
 }
 
 #[test]
-fn every_warning_is_listed_and_every_code_is_used() {
+fn every_warning_code_is_used() {
     let mut all = String::new();
     sources(&project("src"), &mut all);
     let codes: Vec<&str> = CODES
@@ -361,16 +361,6 @@ fn every_warning_is_listed_and_every_code_is_used() {
         assert!(
             names.iter().any(|name| all.contains(name)),
             "{code} is not used"
-        );
-    }
-    for call in all.split("Warning::new(").skip(1) {
-        let Some(literal) = call.trim_start().strip_prefix('"') else {
-            continue;
-        };
-        let code = literal.split('"').next().unwrap_or_default();
-        assert!(
-            codes.contains(&code),
-            "{code} is missing in CODES (src/warning.rs)"
         );
     }
 }

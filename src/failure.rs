@@ -108,7 +108,7 @@ impl fmt::Display for Fault {
 
 impl Failure {
     /// A failure of the work.
-    pub fn failed(code: ErrorCode, message: impl fmt::Display) -> Self {
+    fn failed(code: ErrorCode, message: impl fmt::Display) -> Self {
         Self::Failed(Fault::new(code, message))
     }
 
@@ -118,7 +118,7 @@ impl Failure {
     }
 
     /// A wrong command line.
-    pub fn usage(code: ErrorCode, message: impl fmt::Display) -> Self {
+    fn usage(code: ErrorCode, message: impl fmt::Display) -> Self {
         Self::Usage(Fault::new(code, message))
     }
 

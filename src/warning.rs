@@ -12,16 +12,6 @@ pub struct Warning {
     pub message: String,
 }
 
-impl Warning {
-    /// A warning.
-    pub fn new(code: &'static str, message: impl Into<String>) -> Self {
-        Self {
-            code,
-            message: message.into(),
-        }
-    }
-}
-
 /// Declares the codes, and the list from which `docs/warnings.md` is generated.
 macro_rules! codes {
     ($($group:literal { $($name:ident = $code:literal: $meaning:literal, $remedy:literal;)* })*) => {
@@ -49,7 +39,10 @@ macro_rules! codes {
 impl WarningCode {
     /// A warning of this kind.
     pub fn warning(self, message: impl Into<String>) -> Warning {
-        Warning::new(self.name(), message)
+        Warning {
+            code: self.name(),
+            message: message.into(),
+        }
     }
 }
 

@@ -15,7 +15,7 @@ use super::structure::PlainStand;
 use super::surface::ForceSurface;
 use super::verdict::{Verdict, is_noise};
 use crate::print::{self, relative, rounded};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Ratio between levels of excitation above which errors are compared.
 const LEVELS_DIFFER: f64 = 1.2;
@@ -247,11 +247,8 @@ pub fn shows_torque(over_displacement: bool) -> &'static str {
 pub fn warnings(found: &SearchState, verdict: Verdict) -> Vec<Warning> {
     let before = &found.before;
     if found.refit_diverges {
-        return vec![Warning::new(
-            "declared-not-refitted",
-            "with only the declared effects, the refitted stand diverges on the hold-out records; \"before\" is the stand \
-             file as it is",
-        )];
+        return vec![WarningCode::DeclaredNotRefitted.warning("with only the declared effects, the refitted stand diverges on the hold-out records; \"before\" is the stand \
+             file as it is")];
     }
     let is_open = matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained);
     let apart = is_open.then(|| records_apart(before)).flatten();
@@ -264,7 +261,7 @@ pub fn warnings(found: &SearchState, verdict: Verdict) -> Vec<Warning> {
 /// Training and held-out records that no single stand fits.
 fn records_apart(before: &ScoredModel) -> Option<Warning> {
     let stands = plain_stands_apart(before)?;
-    Some(Warning::new("records-apart", apart(&stands)))
+    Some(WarningCode::RecordsApart.warning(apart(&stands)))
 }
 
 /// Largest relative difference of natural frequency and damping ratio of one stand, and least one of two gains.
@@ -302,23 +299,17 @@ fn apart([train, holdout]: &[PlainStand; 2]) -> String {
 /// effects that may stand in for them.
 fn uncertain_constants(found: &SearchState) -> Option<Warning> {
     if let Some(open) = open_constants(&found.before) {
-        return Some(Warning::new(
-            "training-leaves-constants-open",
-            format!(
+        return Some(WarningCode::TrainingLeavesConstantsOpen.warning(format!(
                 "the training records determine {open}: that, and not a missing effect, may cause the hold-out error; \
                  train on records that excite the resonance"
-            ),
-        ));
+            )));
     }
     let open = open_constants(&found.after)?;
-    Some(Warning::new(
-        "effects-leave-constants-open",
-        format!(
+    Some(WarningCode::EffectsLeaveConstantsOpen.warning(format!(
             "with {}, the training records determine {open}: the effects make up for wrong constants, and their parameters \
              are as uncertain; keep the constants from a record without them, or train on more levels",
             found.after.effect_names().join(" and ")
-        ),
-    ))
+        )))
 }
 
 /// The constants that a fit leaves open, as text.

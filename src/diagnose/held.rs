@@ -22,7 +22,7 @@ use super::{Case, scales};
 use crate::failure::Failure;
 use crate::identify::Motion;
 use crate::print::{rounded, unit_or_as_recorded};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// RMS force of the tying spring relative to the applied quantity. The resulting natural frequency is four times the
 /// frequency at which the inertia balances the applied quantity.
@@ -107,9 +107,7 @@ fn warning(context: &FitContext, stiffness: f64) -> Warning {
     let units = context.held.as_ref().map(|held| &held.recorded);
     let [acting, moved] = units.map_or(["", ""], |u| [u.applied.as_str(), u.measured.as_str()]);
     let factors = units.map_or([1.0; 2], |u| u.factors);
-    Warning::new(
-        "free-body",
-        format!(
+    WarningCode::FreeBody.warning(format!(
             "the body moves freely: a spring of its own would take less than {} % of what is applied. To keep model \
              and motion together, a spring of {} {} per {} ({} Hz) ties both to the measured motion: errors and noise \
              are those of the applied quantity below that frequency",
@@ -118,8 +116,7 @@ fn warning(context: &FitContext, stiffness: f64) -> Warning {
             unit_or_as_recorded(acting),
             unit_or_as_recorded(moved),
             rounded(natural_hz, 3),
-        ),
-    )
+        ))
 }
 
 /// RMS of several series together, each about its mean.

@@ -13,7 +13,7 @@ use super::result::Diagnosis;
 use crate::failure::{ErrorCode, Failure};
 use crate::print::rounded;
 use crate::stand::gain_differs;
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// Loads and readings, in SI units, in the order of measurement.
 pub struct KnownLoads {
@@ -74,14 +74,12 @@ impl KnownLoads {
         different.sort_by(f64::total_cmp);
         different.dedup();
         if different.len() < FEWEST {
-            return Err(Failure::failed(
-                ErrorCode::TooFewSamples,
-                format_args!(
+            return Err(ErrorCode::TooFewSamples
+                .failed(format_args!(
                     "{} different loads are too few; apply at least {FEWEST}, including no load",
                     different.len()
-                ),
-            )
-            .at(&source));
+                ))
+                .at(&source));
         }
         let together = applied.len().div_ceil(MOST);
         let means = |values: &[f64]| -> Vec<f64> {
@@ -205,20 +203,14 @@ impl Diagnosis {
             return Ok(());
         }
         if self.context().held.is_some() {
-            return Err(Failure::failed(
-                ErrorCode::UnsuitableRecord,
-                "--static does not apply: the body moves freely and does not come to rest under a constant load",
-            ));
+            return Err(ErrorCode::UnsuitableRecord.failed("--static does not apply: the body moves freely and does not come to rest under a constant load"));
         }
         let follow = |fitted: &FittedModel| {
             LoadFit::of_model(loads, fitted).map_err(|error| {
-                Failure::failed(
-                    ErrorCode::NotIdentifiable,
-                    format_args!(
+                ErrorCode::NotIdentifiable.failed(format_args!(
                         "the loads of --static do not determine a gain ({error}): the reading does not follow them, or \
                          the recorded quantity does not show constant loads"
-                    ),
-                )
+                    ))
                 .at(&loads[0].source)
             })
         };
@@ -270,13 +262,10 @@ fn contradicted(
     let ratio = after.sum(loads) / before.sum(loads);
     let law = FisherSnedecor::new(freedom, freedom).ok()?;
     (ratio.is_finite() && law.sf(ratio) < BY_CHANCE).then(|| {
-        Warning::new(
-            "loads-contradict-effects",
-            format!(
+        WarningCode::LoadsContradictEffects.warning(format!(
                 "the known loads do not confirm {}: the error under the loads is {} times that of a straight line",
                 effects.join(" and "),
                 rounded(ratio.sqrt(), 3)
-            ),
-        )
+            ))
     })
 }

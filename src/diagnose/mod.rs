@@ -272,10 +272,8 @@ impl SearchState {
             declared.and_then(|declared| ScoredModel::of(declared.model(&plain), &records));
         let declared = declared.map(ScoredModel::without_samples);
         let before = ScoredModel::of(plain, &records).ok_or_else(|| {
-            Failure::failed(
-                ErrorCode::NotIdentifiable,
-                "the plain stand cannot be simulated on the training records",
-            )
+            ErrorCode::NotIdentifiable
+                .failed("the plain stand cannot be simulated on the training records")
         })?;
         let tests = tests(&before);
         let mut found = Self {

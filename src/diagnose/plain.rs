@@ -49,10 +49,8 @@ pub fn find_plain(
     });
     let best = fits.min_by(|a, b| a.train_sum.total_cmp(&b.train_sum));
     let best = best.ok_or_else(|| {
-        Failure::failed(
-            ErrorCode::NotIdentifiable,
-            "the plain stand could not be fitted to the training records",
-        )
+        ErrorCode::NotIdentifiable
+            .failed("the plain stand could not be fitted to the training records")
     })?;
     let found = FitContext {
         several: best.structure.context.several.clone(),

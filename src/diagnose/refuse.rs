@@ -72,14 +72,11 @@ fn refuse_short(case: &Case, context: &FitContext) -> Result<(), Failure> {
     if periods >= FEWEST_PERIODS {
         return Ok(());
     }
-    Err(Failure::failed(
-        ErrorCode::TooFewSamples,
-        format_args!(
+    Err(ErrorCode::TooFewSamples.failed(format_args!(
             "{duration_s:.4} s are only {periods:.1} periods of the fitted natural frequency ({natural_hz:.4} Hz); \
              at least one training record must have {FEWEST_PERIODS} periods. Record for longer, or, for a stand \
              that turns freely, use \"identify runup\""
-        ),
-    )
+        ))
     .at(&record.source))
 }
 
@@ -130,16 +127,13 @@ fn refuse_sign_or_unit(case: &Case, context: &FitContext, as_given: f64) -> Resu
             "check the unit of both channels (mV under a heading in V?), the [calibration] and the [recorder] gain",
         )
     };
-    Err(Failure::failed(
-        ErrorCode::UnsuitableRecord,
-        format_args!(
+    Err(ErrorCode::UnsuitableRecord.failed(format_args!(
             "{}: the measured torque {what}: a stand fitted to it as it is has an error of {}, one with that factor {}; \
          {remedy}",
             train[0].source,
             relative(as_given, 2),
             relative(scaled, 2)
-        ),
-    ))
+        )))
 }
 
 fn refuse_swapped(case: &Case, context: &FitContext, as_given: f64) -> Result<(), Failure> {
@@ -164,15 +158,12 @@ fn refuse_swapped(case: &Case, context: &FitContext, as_given: f64) -> Result<()
     if duration_s * other.plain.natural_hz < FEWEST_PERIODS || the_other_way >= SWAPPED * as_given {
         return Ok(());
     }
-    Err(Failure::failed(
-        ErrorCode::UnsuitableRecord,
-        format_args!(
+    Err(ErrorCode::UnsuitableRecord.failed(format_args!(
             "the channels look swapped: a stand from --applied to --measured has an error of {}, one from \
              --measured to --applied {}; exchange the two",
             relative(as_given, 2),
             relative(the_other_way, 2)
-        ),
-    )
+        ))
     .at(&train[0].source))
 }
 

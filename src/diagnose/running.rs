@@ -11,7 +11,7 @@ use super::operation::{Hidden, OperatingResonance, resonance, steady_lines};
 use super::residual_tests::without_mean;
 use super::result::Diagnosis;
 use crate::print::{relative, with_std};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 
 /// A record of the measured quantity alone, in the unit of the diagnosis.
 pub struct RunningRecord {
@@ -109,13 +109,10 @@ impl Diagnosis {
         let found = found.map_err(Hidden::text);
         let warning = match &found {
             Ok(found) => self.differs(record, found),
-            Err(hidden) => Some(Warning::new(
-                "resonance-hidden",
-                format!(
-                    "{} does not show the resonance of the stand in use: {hidden}",
-                    record.source
-                ),
-            )),
+            Err(hidden) => Some(WarningCode::ResonanceHidden.warning(format!(
+                "{} does not show the resonance of the stand in use: {hidden}",
+                record.source
+            ))),
         };
         let unit = self.context().units.per_printed;
         let hidden = found.as_ref().err().cloned();
@@ -172,9 +169,7 @@ impl Diagnosis {
             with_std(estimate.value(), estimate.std_uncertainty().unwrap_or(0.0))
         };
         (error > DIFFER.1).then(|| {
-            Warning::new(
-                "running-differs",
-                format!(
+            WarningCode::RunningDiffers.warning(format!(
                     "{}: in use, the stand has a natural frequency of {} Hz and a damping ratio of {}; the fitted \
                      stand has {} Hz and {}. A torque compensated with the fitted stand is off by up to {} near the \
                      resonance. Possible causes: clamping, temperature, mounted parts or size of the motion differ \
@@ -186,8 +181,7 @@ impl Diagnosis {
                     shown(&frequency),
                     shown(&ratio),
                     relative(error, 2),
-                ),
-            )
+                ))
         })
     }
 }

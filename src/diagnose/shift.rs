@@ -12,7 +12,7 @@ use super::verdict::remains;
 use super::{Case, SearchState};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::{relative, rounded};
-use crate::warning::Warning;
+use crate::warning::{Warning, WarningCode};
 use torqcomp_dsp::dot;
 
 /// Relative error of the plain stand above which a shift of the channels is considered.
@@ -38,7 +38,9 @@ pub fn refuse(case: &Case, alignment: &Alignment) -> Result<(), Failure> {
     } else {
         return Ok(());
     };
-    Err(Failure::failed(ErrorCode::UnsuitableRecord, text).at(&train[0].source))
+    Err(ErrorCode::UnsuitableRecord
+        .failed(text)
+        .at(&train[0].source))
 }
 
 /// Compares a shift of the channels with the effects found. `smooth` are the records with band-limited input, if the
@@ -55,7 +57,7 @@ pub fn weigh(
     if shift.per_s != 0.0 {
         let explains = error < TWO_CLOCKS * as_given;
         return explains.then(|| ShiftWarning {
-            warning: Warning::new("two-clocks", two_clocks(&records.train, alignment)),
+            warning: WarningCode::TwoClocks.warning(two_clocks(&records.train, alignment)),
             outdoes: true,
         });
     }
@@ -80,7 +82,7 @@ pub fn weigh(
             false => too_early(first, shift, before, after),
         };
         return Some(ShiftWarning {
-            warning: Warning::new("shift-explains-more", text),
+            warning: WarningCode::ShiftExplainsMore.warning(text),
             outdoes: true,
         });
     }
@@ -97,7 +99,7 @@ pub fn weigh(
         relative(after, 3),
     );
     Some(ShiftWarning {
-        warning: Warning::new("shift-or-effect", text),
+        warning: WarningCode::ShiftOrEffect.warning(text),
         outdoes: false,
     })
 }

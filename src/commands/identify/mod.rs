@@ -13,7 +13,7 @@ mod static_load;
 
 use std::path::{Path, PathBuf};
 
-use torqcomp_model::{Dimension, Kind, UnitSystem};
+use torqcomp_model::{Kind, UnitSystem};
 
 use super::{Outcome, conclude, same};
 use crate::cli::identify::{Findings, Identify, Test};
