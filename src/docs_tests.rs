@@ -48,8 +48,9 @@ fn the_list_of_effects_is_that_of_the_code() {
          transition_speed = \"40 N m/s\"\n```\n\n\
          `diagnose` finds effects in records and writes them into the stand file, `simulate` applies them, and \
          `compensate` removes them ([how](compensation.md)). In the equations, `n` is a torque in the stand, \
-         `x'' + 2 zeta w0 x' + w0^2 (x + n) = w0^2 G u`, and `y` is the record. The tables show V for the unit of the \
-         record. For a stand that gives torque, with a calibration for example, read N m instead, whatever the unit of \
+         `x'' + 2 zeta w0 x' + w0^2 (x + n) = w0^2 G u`, and `y` is the record. With a `coupled` second mode, `n` acts \
+         on the first of the two inertias, and with `structural-damping` on a stand that is exact at its natural \
+         frequency. The tables show V for the unit of the record. For a stand that gives torque, with a calibration for example, read N m instead, whatever the unit of \
          the record; for one with `static_gain`, the unit of the record in that key. Bounds are those of `diagnose`, \
          in multiples of `rms` and `peak` of the record about its mean, of `w0` and `f0`, the natural frequency in \
          rad/s and Hz, and of the `length` of the record in s. A stand file may exceed them.\n\n"

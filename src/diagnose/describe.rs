@@ -42,13 +42,7 @@ pub fn residual(
         };
         parts.push(format!("{ratio} times the noise floor"));
     }
-    parts.push(match tests.first_order_noise {
-        Some(correlation) => format!(
-            "coloured as first-order noise, with a correlation of {correlation:.2} between neighbouring samples"
-        ),
-        None if tests.white => "white".to_owned(),
-        None => "not white".to_owned(),
-    });
+    parts.push(colour(tests));
     if found.is_coloured_noise(&found.after, tests) && !tests.white {
         parts.push(
             "coloured noise: the floor is that of white noise, and no effect explains a significant part of the rest"
@@ -88,6 +82,17 @@ pub fn residual(
     let line = |line: &SpectralLine| format!("a line at {} Hz", rounded(line.frequency_hz, 5));
     parts.extend(lines.iter().map(line));
     parts.join("; ")
+}
+
+/// The spectrum of the residual in a word, if there is one.
+fn colour(tests: &ResidualTests) -> String {
+    match tests.first_order_noise {
+        Some(correlation) => format!(
+            "coloured as first-order noise, with a correlation of {correlation:.2} between neighbouring samples"
+        ),
+        None if tests.white => "white".to_owned(),
+        None => "not white".to_owned(),
+    }
 }
 
 /// An error that only the training records show.
