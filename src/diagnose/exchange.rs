@@ -211,6 +211,30 @@ impl SearchState {
         }
     }
 
+    /// Reports an effect that was exchanged for another although the records do not distinguish them.
+    pub(super) fn report_exchanged(&mut self) {
+        let names = self.after.effect_names();
+        for model in std::mem::take(&mut self.path) {
+            let of_model = model.effect_names();
+            let [gone, new] = [(&of_model, &names), (&names, &of_model)].map(|(some, others)| {
+                let mut own = some.iter().filter(|name| !others.contains(name));
+                own.next().filter(|_| own.next().is_none())
+            });
+            let count = model.parameter_count();
+            if let (Some(gone), Some(best)) = (gone, new)
+                && count <= self.after.parameter_count()
+                && model.clone().with_samples().is_no_worse_than(&self.after)
+            {
+                let entries = self.rounds.iter_mut().flatten().rev();
+                let mut entries = entries.filter(|c| c.model.is_some());
+                if let Some(entry) = entries.find(|c| c.effect.name == *gone) {
+                    entry.exchange(&model, best);
+                }
+            }
+            self.path.push(model);
+        }
+    }
+
     /// Adopts a model, if there is one, and returns whether there is.
     fn take_any(&mut self, better: Option<&ScoredModel>, coarse: usize) -> bool {
         if let Some(better) = better {

@@ -236,6 +236,24 @@ impl CandidateFit {
         (candidate, gain)
     }
 
+    /// Replaces its fit by one in which another effect took its place, from which the records do not distinguish it.
+    pub fn exchange(&mut self, model: &ScoredModel, best: &'static str) {
+        let structure = &model.fitted.structure;
+        let place = structure.names().position(|name| name == self.effect.name);
+        let Some(place) = place else { return };
+        let mut parameters = model.parameters();
+        self.form = Some(structure.effects[place].form.name);
+        self.with = model.effect_names();
+        self.with.retain(|name| *name != self.effect.name);
+        self.parameters = parameters.swap_remove(place);
+        self.train_rms = Some(model.errors().train_rms);
+        self.reason = Reason::Tied {
+            best,
+            experiment: self.effect.experiment,
+        };
+        self.model = Some(model.clone());
+    }
+
     /// Names of the effects of its model.
     pub fn names(&self) -> Vec<&'static str> {
         [&self.with[..], &[self.effect.name]].concat()

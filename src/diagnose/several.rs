@@ -96,6 +96,7 @@ impl SearchState {
         }
         self.eliminate(workers.threads);
         self.judge_ties(workers);
+        self.report_exchanged();
         self.ask_guards((&plain, &records), workers);
     }
 
