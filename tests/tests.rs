@@ -5,6 +5,7 @@ mod util;
 
 mod agreement;
 mod applied_noise;
+mod at_resonance;
 mod bad_input;
 mod band;
 mod batch;

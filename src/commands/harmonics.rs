@@ -396,7 +396,7 @@ fn component(fitted: &harmonics::Component, printed: f64, way: &WayBack) -> Comp
         .map_or_else(TorqueStd::default, |(stand, _)| {
             stand.torque_std(fitted.frequency_hz, way.chain.std)
         });
-    let of_torque = |std: &InverseUncertainty| std.magnitude_relative * torque;
+    let of_torque = |std: &InverseUncertainty| std.magnitude() * torque;
     ComponentTorque {
         order: fitted.order,
         frequency_hz: fitted.frequency_hz,

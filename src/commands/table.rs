@@ -11,6 +11,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::identify::Motion;
 use crate::print::{Report, rounded};
 use crate::stand::{self, Mechanics, Stand};
+use torqcomp_model::InverseUncertainty;
 
 /// Maximum number of rows of a table.
 const MOST_ROWS: f64 = 1e7;
@@ -38,7 +39,7 @@ struct TableRow {
     magnitude: f64,
     /// Phase lead of the applied torque over the recorded one, in degrees.
     phase_deg: f64,
-    /// Relative standard uncertainty of the magnitude; `null` if unknown.
+    /// Relative standard uncertainty of the magnitude, to second order in the constants; `null` if unknown.
     magnitude_relative_std: Option<f64>,
     /// Standard uncertainty of the phase, in degrees; `null` if unknown.
     phase_std_deg: Option<f64>,
@@ -97,7 +98,7 @@ fn row(
         frequency_hz,
         magnitude,
         phase_deg: phase_rad.to_degrees(),
-        magnitude_relative_std: std.as_ref().map(|s| s.magnitude_relative),
+        magnitude_relative_std: std.as_ref().map(InverseUncertainty::magnitude),
         phase_std_deg: std.as_ref().map(|s| s.phase_rad.to_degrees()),
     }
 }

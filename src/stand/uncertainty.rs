@@ -56,12 +56,8 @@ impl Stand {
             ConstantStd::NotNeeded => response,
             ConstantStd::Unknown => None,
             ConstantStd::Relative(std) => {
-                let [relative, phase_rad] =
-                    response.map_or([0.0; 2], |of| [of.magnitude_relative, of.phase_rad]);
-                Some(InverseUncertainty {
-                    magnitude_relative: relative.hypot(std),
-                    phase_rad,
-                })
+                let of_constant = InverseUncertainty::of_sum(std, 0.0);
+                Some(response.map_or(of_constant, |of| of.and(&of_constant)))
             }
         };
         TorqueStd {
@@ -80,13 +76,7 @@ impl Stand {
         };
         let of_recorder = self.of_recorder(frequency_hz);
         let known = [of_stand, of_recorder];
-        known
-            .into_iter()
-            .flatten()
-            .reduce(|a, b| InverseUncertainty {
-                magnitude_relative: a.magnitude_relative.hypot(b.magnitude_relative),
-                phase_rad: a.phase_rad.hypot(b.phase_rad),
-            })
+        known.into_iter().flatten().reduce(|a, b| a.and(&b))
     }
 
     fn of_mechanics(&self, frequency_hz: f64) -> Option<InverseUncertainty> {
@@ -121,10 +111,9 @@ impl Stand {
             let parts: Vec<f64> = terms.iter().map(part).collect();
             combined(&correlations, &parts)
         };
-        Some((!terms.is_empty()).then(|| InverseUncertainty {
-            magnitude_relative: size(|z| z.re),
-            phase_rad: size(|z| z.im),
-        }))
+        Some(
+            (!terms.is_empty()).then(|| InverseUncertainty::of_sum(size(|z| z.re), size(|z| z.im))),
+        )
     }
 
     /// The constants of mechanics and effects that have a standard uncertainty.
@@ -198,6 +187,7 @@ impl Stand {
             phase_rad: of_cutoff
                 .im
                 .hypot(TAU * frequency_hz * of_delay.unwrap_or(0.0)),
+            second_order: 0.0,
         })
     }
 }

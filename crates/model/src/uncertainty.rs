@@ -81,10 +81,12 @@ impl ParameterStd {
 /// Standard uncertainty of the inverse transfer function at one frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InverseUncertainty {
-    /// Of the magnitude, as a fraction of it.
+    /// Of the magnitude, as a fraction of it, to first order.
     pub magnitude_relative: f64,
     /// Of the phase, in rad.
     pub phase_rad: f64,
+    /// Of the magnitude by the second order of changes that turn the phase, as a fraction of it: 0 for a delay.
+    pub second_order: f64,
 }
 
 impl InverseUncertainty {
@@ -93,12 +95,49 @@ impl InverseUncertainty {
     ///
     /// ```
     /// // Magnitude 3 % and phase 0.04 rad: 5 %.
-    /// let std = torqcomp_model::InverseUncertainty { magnitude_relative: 0.03, phase_rad: 0.04 };
+    /// let std = torqcomp_model::InverseUncertainty { magnitude_relative: 0.03, phase_rad: 0.04, second_order: 0.0 };
     /// assert!((std.complex_relative() - 0.05).abs() < 1e-12);
     /// ```
     #[must_use]
     pub fn complex_relative(&self) -> f64 {
         self.magnitude_relative.hypot(self.phase_rad)
+    }
+
+    /// To second order, from the relative standard uncertainty of magnitude and phase to first order. At the resonance the
+    /// relative change `jb` of `G` is imaginary, and its magnitude changes by `√(1 + b²) − 1`; the rms of that over a
+    /// normally distributed b is, by Gauss–Hermite quadrature with three nodes, `√((√(1 + 3u²(φ)) − 1)²/3)`.
+    ///
+    /// ```
+    /// use torqcomp_model::InverseUncertainty;
+    /// // The phase is uncertain by 1.5 rad: the magnitude may be twice as large.
+    /// assert!((InverseUncertainty::of_sum(0.0, 1.5).magnitude() - 1.029).abs() < 1e-3);
+    /// // For small changes, √3/2 times the square of the phase.
+    /// assert!((InverseUncertainty::of_sum(0.0, 0.1).magnitude() - 0.0086).abs() < 1e-4);
+    /// ```
+    #[must_use]
+    pub fn of_sum(magnitude_relative: f64, phase_rad: f64) -> Self {
+        let outer = (3.0 * phase_rad.powi(2)).sqrt().hypot(1.0) - 1.0;
+        Self {
+            magnitude_relative,
+            phase_rad,
+            second_order: outer / 3.0_f64.sqrt(),
+        }
+    }
+
+    /// Of the magnitude to second order, as a fraction of it.
+    #[must_use]
+    pub fn magnitude(&self) -> f64 {
+        self.magnitude_relative.hypot(self.second_order)
+    }
+
+    /// Both together, independent of each other.
+    #[must_use]
+    pub fn and(&self, other: &Self) -> Self {
+        Self {
+            magnitude_relative: self.magnitude_relative.hypot(other.magnitude_relative),
+            phase_rad: self.phase_rad.hypot(other.phase_rad),
+            second_order: self.second_order.hypot(other.second_order),
+        }
     }
 }
 
@@ -205,9 +244,10 @@ impl SecondOrder {
             (own + 2.0 * mixed).max(0.0).sqrt()
         };
         let of_gain = std.static_gain_relative.unwrap_or(0.0);
-        Ok(Some(InverseUncertainty {
-            magnitude_relative: spread(gradient.ln_magnitude).hypot(of_gain),
-            phase_rad: spread(gradient.phase_rad),
-        }))
+        let first_order = [gradient.ln_magnitude, gradient.phase_rad].map(spread);
+        Ok(Some(InverseUncertainty::of_sum(
+            first_order[0].hypot(of_gain),
+            first_order[1],
+        )))
     }
 }

@@ -54,7 +54,7 @@ impl PageData {
             GainPoint {
                 frequency_hz,
                 gain: plan.filter.response(frequency_hz).norm() * beside,
-                gain_relative_std: std.total.or(std.response).map(|u| u.magnitude_relative),
+                gain_relative_std: std.total.or(std.response).map(|u| u.magnitude()),
             }
         };
         Ok(Self {
