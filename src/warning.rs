@@ -68,6 +68,7 @@ codes! {
         OrdersBeyondBand = "orders-beyond-band": "orders lie above the band of a compensated record", "compensate with a higher --band, or give the recorded channel and --stand";
         OrdersAboveNyquist = "orders-above-nyquist": "orders above half the sampling rate were left out", "record at a higher rate";
         AmplitudeChanges = "amplitude-changes": "the amplitude of a component changes over the record, so the components are averages", "select a shorter part with --range";
+        LineBesideOrder = "line-beside-order": "a line that is no order lies beside one and makes its component wrong", "add its order to --orders, or record for longer";
         LinesBetweenOrders = "lines-between-orders": "strong lines lie between the orders: the given fundamental may be a multiple of the speed", "give --fundamental as the speed, or add the orders";
         OrdersExplainLittle = "orders-explain-little": "most of the record is neither orders of the fundamental nor noise", "select a part of constant speed with --range, or give its speed";
         SpeedChanges = "speed-changes": "the speed changes or fluctuates over the record, so the components are averages", "select a part of constant speed with --range";

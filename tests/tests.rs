@@ -24,6 +24,7 @@ mod diagnose;
 mod faults;
 mod first_moves;
 mod first_moves_files;
+mod foreign_lines;
 mod formats;
 mod free_body;
 mod golden;

@@ -2,6 +2,7 @@
 
 mod checks;
 mod filtered;
+mod foreign;
 mod level;
 mod lowest;
 mod mains;
@@ -226,7 +227,7 @@ fn fundamental(
     }
     let (given_hz, span) = (args.fundamental, 0.01 * args.refine_span);
     let by =
-        |orders: &[f64]| mains::refine(&record.samples, record.rate_hz, (given_hz, span), orders);
+        |orders: &[f64]| foreign::refine(&record.samples, record.rate_hz, (given_hz, span), orders);
     let at = |fundamental_hz: f64| Rotation {
         record,
         fundamental_hz,

@@ -4,7 +4,8 @@ use torqcomp_dsp::harmonics::{Fundamental, Harmonics};
 
 use super::rotation::Rotation;
 use super::{
-    ComponentTorque, WayBack, filtered, level, multiple, named, speed, unexplained, unlisted,
+    ComponentTorque, WayBack, filtered, foreign::ForeignLines, level, multiple, named, speed,
+    unexplained, unlisted,
 };
 use crate::print::short;
 use crate::recording::UniformRecord;
@@ -22,12 +23,23 @@ pub(super) fn warnings(
         fundamental_hz: fundamental.frequency_hz,
         orders,
     };
-    let shown = unlisted::shown(&given);
+    let orders = unlisted::shown(&given);
     let shown = Rotation {
-        orders: &shown,
+        orders: &orders,
         ..given
     };
-    let mut all = of_orders(way, fundamental.std_hz.is_none(), &given, &shown);
+    let is_given = fundamental.std_hz.is_none();
+    let foreign = ForeignLines::of(&shown, is_given);
+    let kept = foreign.as_ref().map(|foreign| foreign.without(&orders));
+    let kept = Rotation {
+        orders: kept.as_deref().unwrap_or(&orders),
+        ..given
+    };
+    let mut all = of_orders(way, is_given, &given, &kept);
+    // Its place among the orders is that at the right speed.
+    let is_off = all.iter().any(|warning| warning.code == "fundamental-off");
+    let foreign = foreign.filter(|_| !is_off);
+    all.extend(foreign.map(|foreign| foreign.warning(fundamental.frequency_hz)));
     let little = match all.is_empty() {
         true => unexplained::warning(&shown, found),
         false => None,
@@ -42,7 +54,7 @@ pub(super) fn warnings(
 }
 
 /// Checks that the speed is constant and as given, and that all orders are in the band of a compensated record; `shown` has
-/// the requested orders and others that the record shows.
+/// the requested orders and others that the record shows, without those beside other lines.
 fn of_orders(way: &WayBack, is_given: bool, of: &Rotation, shown: &Rotation) -> Vec<Warning> {
     let load = speed::load_changes(of);
     // A load step leaves slow components that bias the speed slightly.

@@ -4,9 +4,9 @@ use std::f64::consts::{PI, TAU};
 
 use torqcomp_dsp::harmonics::{Component, Fundamental, Harmonics, fit, refine_fundamental};
 
-use super::lowest;
-use super::mains::{self, is_at_mains};
+use super::mains::is_at_mains;
 use super::rotation::Rotation;
+use super::{foreign, lowest};
 use crate::cli::REFINE_SPAN;
 use crate::print::rounded;
 use crate::warning::{Warning, WarningCode};
@@ -48,7 +48,8 @@ pub(super) fn off(of: &Rotation, load_changes: bool) -> Option<Warning> {
     let samples = of.first(length)?;
     let given = of.fitted(&samples, fundamental_hz)?;
     let within = |span: f64| {
-        let found = mains::refine(&samples[..], rate_hz, (fundamental_hz, span), of.orders).ok()?;
+        let found =
+            foreign::refine(&samples[..], rate_hz, (fundamental_hz, span), of.orders).ok()?;
         let better = of.fitted(&samples, found.frequency_hz)?;
         let is_there = better.components.iter().any(is_sure)
             && !is_attracted(&given, &better, length as f64 / rate_hz);
@@ -246,7 +247,7 @@ pub(super) fn sure_orders(samples: &[f64], rate_hz: f64, hz: f64, orders: &[f64]
 }
 
 /// By each significant order in each window: the angle of the shaft relative to its mean, and the variance of that.
-fn angles_by_order(
+pub(super) fn angles_by_order(
     samples: &[f64],
     rate_hz: f64,
     fundamental: Fundamental,
@@ -285,12 +286,12 @@ fn angles_by_order(
 }
 
 /// Mean of the variances of values.
-fn mean_variance(values: &[[f64; 2]]) -> f64 {
+pub(super) fn mean_variance(values: &[[f64; 2]]) -> f64 {
     values.iter().map(|[_, variance]| variance).sum::<f64>() / values.len() as f64
 }
 
 /// Variance of values about a straight line.
-fn without_line(values: &[[f64; 2]]) -> f64 {
+pub(super) fn without_line(values: &[[f64; 2]]) -> f64 {
     let count = values.len() as f64;
     let middle = 0.5 * (count - 1.0);
     let mean = values.iter().map(|[y, _]| y).sum::<f64>() / count;
