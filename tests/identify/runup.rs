@@ -234,3 +234,56 @@ fn an_angle_that_wraps_is_continued() {
     let refused = found(0.4 * TAU).unwrap_err().to_string();
     assert!(refused.contains("wraps and cannot be made"), "{refused}");
 }
+
+/// 8 s of an arm with viscous friction and a torque of gravity, by small steps: angle, speed and torque at 500 Hz.
+fn arm([sine, cosine]: [f64; 2], noise: &mut Noise) -> [Vec<f64>; 3] {
+    let drive = |t: f64| 2.2 * (2.5 * t).sin() + 0.8 * (6.9 * t + 0.3).sin();
+    let (mut angle, mut speed) = (0.0_f64, 0.0_f64);
+    let step_s = 1e-5;
+    let mut record = [Vec::new(), Vec::new(), Vec::new()];
+    for k in 0..800_000 {
+        let t = f64::from(k) * step_s;
+        if k % 200 == 0 {
+            record[0].push(angle + 1e-4 * noise.normal());
+            record[1].push(speed + 1e-2 * noise.normal());
+            record[2].push(drive(t) + 0.02 * noise.normal());
+        }
+        let load = |angle: f64, speed: f64, t: f64| {
+            (drive(t) - 0.3 * speed - sine * angle.sin() - cosine * angle.cos()) / 0.05
+        };
+        let half = speed + 0.5 * step_s * load(angle, speed, t);
+        let middle = angle + 0.5 * step_s * speed;
+        speed += step_s * load(middle, half, t + 0.5 * step_s);
+        angle += step_s * half;
+    }
+    record
+}
+
+#[test]
+fn gravity_on_an_arm_does_not_bias_its_inertia() {
+    let mut noise = Noise(18);
+    for gravity in [[0.4, 0.0], [0.1, 0.05], [0.0, 0.0], [0.0, 0.0]] {
+        let [angles, speeds, torques] = arm(gravity, &mut noise);
+        for (kind, motion) in [(Motion::Displacement, &angles), (Motion::Speed, &speeds)] {
+            let run = runup::FreeRun {
+                rate_hz: 500.0,
+                kind,
+                ..turning(motion, &torques)
+            };
+            let found = runup::identify(&run, &runup::RunupOptions::default()).unwrap();
+            let within = |name: &str, truth: f64, most: f64| {
+                let own = of(&found, name);
+                let std = own.std().unwrap();
+                let is_right = (own.value() - truth).abs() < 4.0 * std && std < most;
+                assert!(is_right, "{gravity:?} {kind:?}: {:?}", found.parameters);
+            };
+            within("inertia", 0.05, 2e-3);
+            let is_fitted = found.get("gravity_sine").is_some();
+            assert_eq!(is_fitted, gravity != [0.0; 2], "{:?}", found.parameters);
+            if is_fitted && kind == Motion::Displacement {
+                within("gravity_sine", gravity[0], 0.02);
+                within("gravity_cosine", gravity[1], 0.02);
+            }
+        }
+    }
+}

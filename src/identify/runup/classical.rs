@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use torqcomp_dsp::zero_phase::low_pass;
 use torqcomp_model::fit::linear;
 
-use super::FreeRun;
+use super::{FreeRun, Terms};
 use crate::failure::Failure;
 use crate::identify::{Comparison, FitQuality, Motion, NamedEstimate, rms};
 use crate::print::short;
@@ -17,7 +17,7 @@ const ORDER: u32 = 4;
 pub(super) fn identify(
     run: &FreeRun,
     moves: &[bool],
-    (is_both, split): (bool, bool),
+    (is_both, terms): (bool, Terms),
     half: usize,
     names: &[(&'static str, &'static str)],
 ) -> Result<Option<Comparison>, Failure> {
@@ -35,7 +35,7 @@ pub(super) fn identify(
         .step_by(step)
         .filter(|r| moves[*r])
         .collect();
-    let columns = columns(run, (is_both, split), &rows, smooth)?;
+    let columns = columns(run, (is_both, terms), &rows, smooth)?;
     let design = DMatrix::from_fn(rows.len(), columns.len(), |r, c| columns[c][r]);
     let right = at(&rows, &smooth(run.effort)?);
     let fit = linear::solve(&design, &right, None, false)?;
@@ -66,7 +66,7 @@ fn at(rows: &[usize], samples: &[f64]) -> Vec<f64> {
 /// Terms of the equation from filtered samples at some rows.
 fn columns(
     run: &FreeRun,
-    (is_both, split): (bool, bool),
+    (is_both, terms): (bool, Terms),
     rows: &[usize],
     smooth: impl Fn(&[f64]) -> Result<Vec<f64>, torqcomp_dsp::Error>,
 ) -> Result<Vec<Vec<f64>>, Failure> {
@@ -80,11 +80,16 @@ fn columns(
     let changes = rows.iter().map(|r| difference(&speed, *r, rate));
     let mut columns = vec![changes.collect()];
     let speeds = at(rows, &speed);
-    if split {
+    if terms.is_split {
         columns.push(speeds.iter().map(|v| v.max(0.0)).collect());
         columns.push(speeds.iter().map(|v| v.min(0.0)).collect());
     } else {
         columns.push(speeds);
+    }
+    if let Some(angle) = terms.angle {
+        for part in [f64::sin, f64::cos] {
+            columns.push(rows.iter().map(|r| part(angle[*r])).collect());
+        }
     }
     if is_both {
         speed.iter_mut().for_each(|v| *v = v.signum());

@@ -31,9 +31,9 @@ pub(super) enum Missing {
 impl FittedRows {
     /// The term that matters and leaves the smallest residual.
     pub fn missing(&self) -> Option<Missing> {
-        let delay = self.with("delay", &self.rows.slope);
+        let delay = self.with(&[("delay", &self.rows.slope)]);
         let drag = self.rows.drag.as_ref();
-        let drag = drag.and_then(|drag| self.with("drag", drag));
+        let drag = drag.and_then(|drag| self.with(&[("drag", drag)]));
         match (delay, drag.filter(|drag| drag.coefficient > 0.0)) {
             (Some(delay), Some(drag)) if drag.left < delay.left => Some(Missing::Drag(drag)),
             (Some(delay), _) => Some(Missing::Delay(delay)),
@@ -41,13 +41,24 @@ impl FittedRows {
         }
     }
 
-    /// The fit with one more term, if it matters.
-    fn with(&self, name: &'static str, column: &[f64]) -> Option<MissingTerm> {
+    /// Whether a torque that varies with the angle matters, by its part in the columns of other rows, and leaves a
+    /// smaller residual than other terms.
+    pub fn lacks(&self, gravity: [(&'static str, &Vec<f64>); 2]) -> bool {
+        let of_other = self.missing().map_or(f64::INFINITY, |found| match found {
+            Missing::Delay(term) | Missing::Drag(term) => term.left,
+        });
+        self.with(&gravity).is_some_and(|term| term.left < of_other)
+    }
+
+    /// The fit with more terms, if one of them matters; the coefficient is that of the last.
+    fn with(&self, terms: &[(&'static str, &Vec<f64>)]) -> Option<MissingTerm> {
         let rows = &self.rows;
+        let columns: Vec<Vec<f64>> = terms.iter().map(|(_, column)| column.to_vec()).collect();
+        let names: Vec<&str> = terms.iter().map(|(name, _)| *name).collect();
         let with = WindowRows {
-            columns: [&rows.columns[..], &[column.to_vec()]].concat(),
-            orders: [&rows.orders[..], &[None]].concat(),
-            names: [&rows.names[..], &[name]].concat(),
+            columns: [&rows.columns[..], &columns].concat(),
+            orders: [&rows.orders[..], &vec![None; terms.len()]].concat(),
+            names: [&rows.names[..], &names].concat(),
             right: rows.right.clone(),
             slope: Vec::new(),
             drag: None,
@@ -59,17 +70,18 @@ impl FittedRows {
         let found = with.solve(&self.used).ok()?;
         let mut values = found.numbers.values().to_vec();
         let std = |fit: &Corrected, k: usize| fit.numbers.covariance().std(k);
-        let std_of_term = std(&found, values.len() - 1)?;
-        let coefficient = values.pop()?;
+        let added = values.split_off(rows.columns.len());
+        let mut each = (rows.columns.len()..).zip(&added);
+        let is_clear =
+            each.any(|(k, value)| std(&found, k).is_some_and(|s| value.abs() > CLEAR * s));
         let left = |fit: &Corrected| rms(&self.used(&fit.residuals));
         let is_less = left(&found) < MATTERS.0 * left(&self.fit);
         let mut changes = values.iter().zip(self.fit.numbers.values()).enumerate();
         let moves = changes.any(|(k, (new, old))| {
             std(&self.fit, k).is_some_and(|std| (new - old).abs() > MATTERS.1 * std)
         });
-        let is_clear = coefficient.abs() > CLEAR * std_of_term;
         (is_clear && (is_less || moves)).then(|| MissingTerm {
-            coefficient,
+            coefficient: added[added.len() - 1],
             values,
             left: left(&found),
         })

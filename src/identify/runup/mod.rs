@@ -4,6 +4,8 @@
 //! T = J θ'' + f θ' + F_c sgn θ' + C          (C1) with dry friction
 //! ```
 //!
+//! and, where it is significant, G sin θ + H cos θ, the torque of gravity on an unbalanced arm.
+//!
 //! The equation is averaged over smooth windows ([`torqcomp_dsp::weak`]), which gives derivatives without finite
 //! differences, and solved by least squares, with the bias from motion noise removed from the normal equations. For
 //! comparison, the classical method of robot identification: zero-phase low-pass, central differences, least squares
@@ -12,6 +14,7 @@
 mod check;
 mod classical;
 mod directions;
+mod gravity;
 mod missing;
 mod present;
 mod regression;
@@ -25,7 +28,8 @@ use super::{FitQuality, Identification, Motion, NamedEstimates, rms};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::short;
 use directions::Directions;
-use windows::{WindowRows, plateau};
+use gravity::{GRAVITY, angle};
+use windows::{FittedRows, WindowRows, plateau};
 
 /// Type of motion, which determines names and units of the constants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,6 +95,15 @@ pub struct RunupOptions {
     pub half_window_s: Option<f64>,
 }
 
+/// Which terms the equation of motion has besides those of every run.
+#[derive(Debug, Clone, Copy)]
+struct Terms<'a> {
+    /// Whether viscous friction depends on direction.
+    is_split: bool,
+    /// Angle at each sample, if the torque varies with it.
+    angle: Option<&'a [f64]>,
+}
+
 /// Minimum reported increase of an uncertainty due to autocorrelation.
 const COLOURED: f64 = 1.3;
 /// Residual relative to the torque above which the motion does not explain it.
@@ -130,14 +143,21 @@ pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification,
     };
     let few_samples = check::swings(run)?;
     let directions = Directions::of(run)?;
-    let split = options.by_direction && directions.both();
-    let half = match options.half_window_s {
-        Some(seconds) => given_half(seconds, run)?,
-        None => plateau(run, &directions),
+    let plain = Terms {
+        is_split: options.by_direction && directions.both(),
+        angle: None,
     };
-    let fitted = WindowRows::of(run, &directions, half, split)?.fit()?;
+    let angle = angle(run);
+    let fitted = fitted(run, &directions, plain, options);
+    let (terms, fitted) = gravity::fitted(
+        run,
+        &directions,
+        (plain, options),
+        (angle.as_deref(), fitted),
+    )?;
+    let half = fitted.rows.half;
     let mut result = Identification::new("runup");
-    let names = present::names(run, &directions, split);
+    let names = present::names(run, &directions, terms);
     result.add(NamedEstimates::new(&names, &fitted.fit.numbers));
     let left = rms(&fitted.moving(&fitted.fit.residuals));
     result.fit = Some(FitQuality {
@@ -146,6 +166,7 @@ pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification,
         relative: left / rms(&fitted.moving(&fitted.rows.right)),
     });
     result.method.extend(wrapped::method(wraps));
+    result.method.extend(gravity::method(run, terms));
     present::method(&mut result, run, &directions, &fitted);
     present::draw(&mut result, run, &fitted);
     present::warnings(
@@ -159,7 +180,21 @@ pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification,
     // The comparison takes the most memory.
     drop(fitted);
     let moves = directions.into_moves();
-    let classical = classical::identify(run, &moves, (is_both, split), half, &names)?;
+    let classical = classical::identify(run, &moves, (is_both, terms), half, &names)?;
     result.comparisons.extend(classical);
     Ok(result)
+}
+
+/// The fit with these terms, in the given window or the one found.
+fn fitted(
+    run: &FreeRun,
+    directions: &Directions,
+    terms: Terms,
+    options: &RunupOptions,
+) -> Result<FittedRows, Failure> {
+    let half = match options.half_window_s {
+        Some(seconds) => given_half(seconds, run)?,
+        None => plateau(run, directions, terms),
+    };
+    WindowRows::of(run, directions, half, terms)?.fit()
 }

@@ -4,7 +4,7 @@ use super::directions::Directions;
 use super::missing::{Missing, MissingTerm};
 use super::resolution::too_few;
 use super::windows::FittedRows;
-use super::{COLOURED, FreeRun, POOR, RunupOptions};
+use super::{COLOURED, FreeRun, GRAVITY, POOR, RunupOptions, Terms};
 use crate::chart::{Chart, Series};
 use crate::identify::{Identification, Motion};
 use crate::print::{rounded, short};
@@ -17,15 +17,18 @@ const NOISY: f64 = 0.2;
 pub(super) fn names(
     run: &FreeRun,
     directions: &Directions,
-    split: bool,
+    terms: Terms,
 ) -> Vec<(&'static str, &'static str)> {
     let body = run.body;
     let mut names = vec![body.inertia()];
-    if split {
+    if terms.is_split {
         names.push(("viscous_friction_forward", body.viscous()));
         names.push(("viscous_friction_backward", body.viscous()));
     } else {
         names.push(("viscous_friction", body.viscous()));
+    }
+    if terms.angle.is_some() {
+        names.extend(GRAVITY.map(|name| (name, body.effort())));
     }
     if directions.both() {
         names.push(("dry_friction", body.effort()));
@@ -235,6 +238,7 @@ fn impossible(result: &mut Identification, lacks_term: bool) {
     let constants = result.parameters.iter();
     let impossible: Vec<&str> = constants
         .filter(|c| c.name != "offset" && c.name != "dry_friction_and_offset")
+        .filter(|c| !GRAVITY.contains(&c.name.as_str()))
         .filter(|c| c.value() + 3.0 * c.std().unwrap_or(0.0) < 0.0)
         .map(|c| c.name.as_str())
         .collect();

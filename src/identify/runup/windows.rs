@@ -6,7 +6,7 @@ use super::directions::{Directions, chauvenet, chosen};
 use super::present::names;
 use super::regression::{Corrected, Errors, left_side, not_identifiable, solve};
 use super::resolution::shortest_half;
-use super::{COLOURED, FreeRun, LEAST_WINDOWS, POOR, SHORTEST_HALF};
+use super::{COLOURED, FreeRun, LEAST_WINDOWS, POOR, SHORTEST_HALF, Terms};
 use crate::failure::{ErrorCode, Failure};
 use crate::identify::rms;
 use crate::print::plural;
@@ -56,7 +56,7 @@ impl WindowRows {
         run: &FreeRun,
         directions: &Directions,
         half: usize,
-        split: bool,
+        terms: Terms,
     ) -> Result<Self, Failure> {
         let window = Window::new(half, run.rate_hz)?;
         let stride = (half / 2).max(1);
@@ -79,8 +79,8 @@ impl WindowRows {
             let average = |c: &usize| window.at(samples, *c, order);
             centres.iter().map(average).collect()
         };
-        let (columns, orders) = terms(run, directions, split, centres.len(), &column);
-        let names = names(run, directions, split).into_iter();
+        let (columns, orders) = columns(run, directions, terms, centres.len(), &column);
+        let names = names(run, directions, terms).into_iter();
         let drag = directions.speed.as_ref().map(|speed| {
             let squares = speed.iter().map(|v| v * v.abs());
             column(&squares.collect::<Vec<_>>(), 0)
@@ -232,17 +232,17 @@ impl FittedRows {
 }
 
 /// Terms of the equation of motion, with the order of the derivative of the motion in each.
-fn terms(
+fn columns(
     run: &FreeRun,
     directions: &Directions,
-    split: bool,
+    terms: Terms,
     rows: usize,
     column: &dyn Fn(&[f64], usize) -> Vec<f64>,
 ) -> (Vec<Vec<f64>>, Vec<Option<usize>>) {
     let top = 2 - run.kind.order() as usize;
     let mut columns = vec![column(run.motion, top)];
     let mut orders = vec![Some(top)];
-    match (&directions.speed, split) {
+    match (&directions.speed, terms.is_split) {
         (Some(speed), true) => {
             for keep in [|v: f64| v.max(0.0), |v: f64| v.min(0.0)] {
                 let part: Vec<f64> = speed.iter().map(|v| keep(*v)).collect();
@@ -260,6 +260,13 @@ fn terms(
             orders.push(None);
         }
     }
+    if let Some(angle) = terms.angle {
+        for part in [f64::sin, f64::cos] {
+            let of_angle: Vec<f64> = angle.iter().map(|angle| part(*angle)).collect();
+            columns.push(column(&of_angle, 0));
+            orders.push(None);
+        }
+    }
     if directions.both() {
         columns.push(column(&directions.sign, 0));
         orders.push(None);
@@ -269,7 +276,7 @@ fn terms(
     (columns, orders)
 }
 
-fn integral(samples: &[f64], rate_hz: f64) -> Vec<f64> {
+pub(super) fn integral(samples: &[f64], rate_hz: f64) -> Vec<f64> {
     let mut sum = 0.0;
     let mut last = samples[0];
     samples
@@ -282,22 +289,26 @@ fn integral(samples: &[f64], rate_hz: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Half-length of the window to use. Always determined with one viscous friction.
+/// Half-length of the window to use, with these terms. Always determined with one viscous friction.
 ///
 /// Noise, ripple or hum of the motion may outweigh its acceleration in short windows, and the constants are then near
 /// zero in all of them. So if the motion does not explain the torque in the window found, one is taken in which it
 /// explains it at least twice as well, if there is any.
-pub(super) fn plateau(run: &FreeRun, directions: &Directions) -> usize {
+pub(super) fn plateau(run: &FreeRun, directions: &Directions, terms: Terms) -> usize {
+    let terms = Terms {
+        is_split: false,
+        ..terms
+    };
     let moving = directions.moving(run.motion);
     let longest = moving.len() / (LEAST_WINDOWS / 2 + 2);
     let mut shortest = shortest_half(&moving, run.effort).min(longest.max(SHORTEST_HALF));
     // As large as a channel.
     drop(moving);
     // Between rests, there may be no room for it.
-    while shortest > SHORTEST_HALF && WindowRows::of(run, directions, shortest, false).is_err() {
+    while shortest > SHORTEST_HALF && WindowRows::of(run, directions, shortest, terms).is_err() {
         shortest = SHORTEST_HALF.max(shortest * 2 / 3);
     }
-    let found = |most: f64| steadiest(run, directions, [shortest, longest], most);
+    let found = |most: f64| steadiest(run, (directions, terms), [shortest, longest], most);
     match found(f64::INFINITY) {
         Some((half, left)) if left > POOR => {
             found(POOR.min(0.5 * left)).map_or(half, |(half, _)| half)
@@ -311,7 +322,7 @@ pub(super) fn plateau(run: &FreeRun, directions: &Directions) -> usize {
 /// much unexplained, and what it leaves: shorter ones are noisy, longer ones average over deviations from the equation.
 fn steadiest(
     run: &FreeRun,
-    directions: &Directions,
+    (directions, terms): (&Directions, Terms),
     [shortest, longest]: [usize; 2],
     most: f64,
 ) -> Option<(usize, f64)> {
@@ -320,7 +331,7 @@ fn steadiest(
     let mut last: Option<Tried> = None;
     let mut half = shortest;
     while half <= longest {
-        let fitted = WindowRows::of(run, directions, half, false).and_then(WindowRows::fit);
+        let fitted = WindowRows::of(run, directions, half, terms).and_then(WindowRows::fit);
         let fitted = fitted.ok().map(|fitted| (fitted.unexplained(), fitted));
         if let Some((left, fitted)) = fitted.filter(|(left, _)| *left <= most) {
             let tried = Tried::of(fitted);
