@@ -190,6 +190,8 @@ codes! {
         TimeFalls = "time-falls": "a column named like time decreases too often to be time and was read as a channel", "choose the time with --time-column, or give --rate";
         TimeGaps = "time-gaps": "samples are missing between time stamps", "use --fill linear for short gaps";
         TimeJitter = "time-jitter": "time steps differ by more than 1 %", "use --resample, or --rate if the stamps are arrival times";
+        ClocksDisagree = "clocks-disagree": "two time columns of a table run at different speeds", "find out which is right, and choose it with --time-column";
+        CounterJumps = "counter-jumps": "a column that counts the rows jumps, so rows are missing, and no other time shows it", "select a part without jumps, or use the column as time";
         TimeLeftOut = "time-left-out": "a column named like time disagrees with the time of the rows and was ignored", "choose another with --time-column";
     }
     "Samples" {
@@ -201,7 +203,7 @@ codes! {
         ChannelMultiple = "channel-multiple": "a channel is a multiple of another one, apart from rounding", "use one of them";
         Clipped = "clipped": "the signal is clipped at its highest or lowest value", "record with a larger range";
         CoarseQuantisation = "coarse-quantisation": "the signal spans fewer than 256 quantisation steps (100 where it is fitted), or stays within one for most of a window of a run-up", "use a smaller input range; for a run-up, a longer --window";
-        TwoSignals = "two-signals": "every other sample belongs to another signal: two sources are mixed in one record", "record each under a name of its own";
+        TwoSignals = "two-signals": "the samples of two or more signals follow in turn: several sources are mixed in one record", "record each under a name of its own";
         ConstantChannel = "constant-channel": "all samples are the same", "check the connection, or choose another channel";
         IdenticalFiles = "identical-files": "files are identical, byte for byte; in a fit, they count twice, and its uncertainties are too small", "remove the copies";
         MainsLines = "mains-lines": "lines at multiples of 50 or 60 Hz stand out", "check grounding and shielding, or declare the effect mains-pickup";

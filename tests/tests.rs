@@ -57,6 +57,7 @@ mod rates;
 mod recordings;
 mod refined;
 mod reports;
+mod rows_in_turn;
 mod running;
 mod schema;
 mod simulate;

@@ -1,5 +1,6 @@
 //! Detection of time columns, and the axis of every other column.
 
+mod counters;
 mod groups;
 mod header_rate;
 mod left_out;
@@ -174,6 +175,8 @@ impl Sources<'_> {
         }
         let (mut rules, mut warnings) = (Vec::new(), Vec::new());
         warnings.extend(self.falling_time(&rest, &named.times));
+        warnings.extend(self.jumping_counter(&used, &named.times));
+        warnings.extend(self.sources_in_turn(&rest));
         for group in groups(&named.times, &rest) {
             group
                 .times
@@ -182,6 +185,7 @@ impl Sources<'_> {
             let rule = self.rule(&group, named.assumed.as_deref())?;
             self.refuse_two_clocks(&group, &rule)?;
             warnings.extend(self.other_times(&group, &rule));
+            warnings.extend(self.other_clocks(&group, &rule));
             warnings.extend(self.overridden_unit(&rule));
             // The time of columns without numbers is not a channel.
             let is_channel = |place: &&usize| !self.fields[**place].is_label;
