@@ -134,3 +134,18 @@ fn a_load_let_go_slowly_is_no_free_decay() {
         }
     }
 }
+
+/// A hammer that bounces: once, after a while, or twice in quick succession.
+#[test]
+fn a_rebound_is_a_restart_and_no_damping() {
+    let mut noise = Noise(16);
+    for (later_s, size) in [(0.05, 0.4), (0.06, 0.3), (0.1, 0.5)] {
+        let hit = |t: f64, at_s: f64| pulse(t, (at_s, 4e-3)).powi(2);
+        let record = driven(|t| hit(t, 0.1) + size * hit(t, 0.1 + later_s), (0.015, 0.0));
+        let found = identified(record, &mut noise, 0.003);
+        let what = format!("{size} of the first after {later_s} s");
+        check(&found, 0.015, &what);
+        let told = codes(&found);
+        assert!(told.contains(&"restart-in-decay"), "{what}: {told:?}");
+    }
+}

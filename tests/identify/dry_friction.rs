@@ -173,3 +173,34 @@ fn the_one_mode_asked_for_has_its_friction() {
         );
     }
 }
+
+/// Two modes at 180 and 184 Hz beat: their envelope falls to zero as at a stop.
+#[test]
+fn two_modes_that_beat_are_no_dry_friction() {
+    let mut noise = Noise(17);
+    let mut found_as_two = 0;
+    for (hz, ratio, size) in [(184.0, 0.012, 0.5), (183.0, 0.01, 0.3)] {
+        let mode = |hz: f64, ratio: f64, t: f64| {
+            let omega = TAU * hz;
+            (-ratio * omega * t).exp() * (omega * (1.0 - ratio * ratio).sqrt() * t).sin()
+        };
+        let at = |t: f64| match t < 0.1 {
+            true => 0.0,
+            false => mode(180.0, 0.015, t - 0.1) + size * mode(hz, ratio, t - 0.1),
+        };
+        let record = times(4000, 2000.0).into_iter().map(at);
+        let record: Vec<f64> = record.map(|x| x + 0.002 * noise.normal()).collect();
+        let found = of_decay(&record, 2000.0);
+        let named = found.parameters.iter();
+        let named = named.filter(|p| p.name.ends_with("natural_frequency"));
+        let mut modes: Vec<f64> = named.map(|p| p.value()).collect();
+        modes.sort_by(f64::total_cmp);
+        let told = found.warnings.iter();
+        let is_asked = told.map(|w| w.code).any(|code| code == "close-lines");
+        let is_two =
+            modes.len() == 2 && (modes[0] - 180.0).abs() < 0.1 && (modes[1] - hz).abs() < 0.1;
+        assert!(is_two || is_asked, "{hz} Hz, {size}: {modes:?}");
+        found_as_two += usize::from(is_two);
+    }
+    assert!(found_as_two > 0);
+}

@@ -6,7 +6,7 @@
 
 use torqcomp_model::fit::FitError;
 
-use super::attempt::Attempt;
+use super::attempt::{Attempt, leaves_noise};
 use super::jumps::jumps_s;
 use super::modes::Stretch;
 use super::search::{ModeSearch, search};
@@ -16,18 +16,25 @@ use crate::identify::{Pole, rms};
 /// Number of periods after a restart over which residuals are compared.
 const COMPARED: usize = 8;
 /// Ratio of the residual of the later part, fitted alone, to that of the whole fit there, below which it is clearly smaller.
-const BETTER: f64 = 0.7;
+pub(super) const BETTER: f64 = 0.7;
 /// Ratio of residuals up to which they are equal.
 pub(super) const AS_GOOD: f64 = 1.25;
+/// Residual of the part before, relative to that of the whole fit after the restart, up to which it is a decay of its own: at
+/// its ends it has samples of the contact.
+const SMALL: f64 = 0.05;
 /// Periods after the start of a segment that are tried as well, and the minimum ratio of the residual in its first half to
 /// that in its last quarter for this.
 const EARLY: [f64; 3] = [1.5, 3.0, 6.0];
+/// Further ones where many modes do not explain a decay.
+const LATER: [f64; 2] = [12.0, 24.0];
 const FALLS: f64 = 1.5;
 /// Minimum ratio of the difference between the samples of the period before and the later fit, extrapolated backwards, to
 /// this fit, above which the earlier part does not lead to the later one.
 const APART: f64 = 1.0;
 /// Relative frequency difference up to which parts ring at the same frequency.
 const ALIKE: f64 = 0.1;
+/// Number of modes from which a later part is no simpler than many.
+const SEVERAL: usize = 3;
 /// Maximum number of modes with which a later part is tried, so that a record full of lines does not take much longer.
 const FEW: usize = 4;
 /// Maximum number of restarts in all segments.
@@ -50,7 +57,7 @@ pub(super) struct Beginning {
 pub(super) fn cut<'a>(
     mut found: Attempt<'a>,
     stretches: &mut Vec<Stretch>,
-    (wanted, lines): (&'a ModeSearch, &'a [SteadyLine]),
+    (wanted, lines): (&ModeSearch, &'a [SteadyLine]),
 ) -> Result<(Attempt<'a>, Vec<Beginning>), FitError> {
     let mut all = Vec::new();
     let mut place = 0;
@@ -77,7 +84,7 @@ struct Cutting<'a, 'b> {
     whole: &'b Attempt<'a>,
     stretches: &'b [Stretch],
     place: usize,
-    search: (&'a ModeSearch, &'a [SteadyLine]),
+    search: (&'b ModeSearch, &'a [SteadyLine]),
 }
 
 /// A fit to other segments.
@@ -95,6 +102,8 @@ struct Onset {
     /// Residual of the later part fitted alone, and frequency of its strongest mode.
     left: f64,
     frequency_hz: f64,
+    /// Residual of the whole fit there.
+    of_whole: f64,
     /// Difference between the samples of the period before and that fit, extrapolated backwards, relative to the fit.
     apart: f64,
     /// Whether that residual is clearly smaller than that of the whole fit; otherwise there are fewer modes.
@@ -135,9 +144,20 @@ impl<'a> Cutting<'a, '_> {
             let mut times_s = jumps_s(stretch, period_s);
             if falls(residuals) {
                 times_s.extend(EARLY.map(|periods| periods * period_s));
+                if self.whole.fit.poles.len() > FEW {
+                    times_s.extend(LATER.map(|periods| periods * period_s));
+                }
             }
             for time_s in times_s {
                 moments.extend(self.moment(time_s, period_s)?);
+            }
+        }
+        if self.whole.fit.poles.len() > FEW {
+            moments.sort_by_key(|moment| moment.behind);
+            for moment in moments.iter().filter(|moment| moment.is_better) {
+                if let Some(cut) = self.later(moment, true)? {
+                    return Ok(Some(cut));
+                }
             }
         }
         for moment in &moments {
@@ -150,7 +170,7 @@ impl<'a> Cutting<'a, '_> {
         moments.retain(|moment| moment.is_better && moment.left < least);
         moments.sort_by_key(|moment| moment.behind);
         for moment in &moments {
-            if let Some(cut) = self.later(moment)? {
+            if let Some(cut) = self.later(moment, false)? {
                 return Ok(Some(cut));
             }
         }
@@ -170,6 +190,7 @@ impl<'a> Cutting<'a, '_> {
             compared: COMPARED * period,
             left: 0.0,
             frequency_hz: 0.0,
+            of_whole: 0.0,
             apart: 0.0,
             is_better: false,
         };
@@ -196,10 +217,10 @@ impl<'a> Cutting<'a, '_> {
         let pairs = stretch.values[before].iter().zip(&carried_on);
         let apart: Vec<f64> = pairs.map(|(value, fit)| value - fit).collect();
         moment.apart = rms(&apart) / rms(&carried_on);
-        let of_whole = moment.start(of_whole);
-        moment.is_better = moment.left < BETTER * of_whole;
-        let is_simpler =
-            found.fit.poles.len() < self.whole.fit.poles.len() && moment.left < AS_GOOD * of_whole;
+        moment.of_whole = moment.start(of_whole);
+        moment.is_better = moment.left < BETTER * moment.of_whole;
+        let is_simpler = found.fit.poles.len() < self.whole.fit.poles.len()
+            && moment.left < AS_GOOD * moment.of_whole;
         Ok((moment.is_better || is_simpler).then_some(moment))
     }
 
@@ -213,9 +234,14 @@ impl<'a> Cutting<'a, '_> {
         let (found, cut) = self.search(self.with(&parts))?;
         let [before, behind] = [0, 1].map(|k| &found.fit.residuals[self.place + k]);
         let is_simpler = found.fit.poles.len() < self.whole.fit.poles.len();
+        // Parts of a decay whose frequency changes take several modes.
+        let small = match found.fit.poles.len() {
+            1 => SMALL * moment.of_whole,
+            _ => 0.0,
+        };
         let is_good = (moment.is_better || is_simpler)
             && moment.start(behind) < AS_GOOD * moment.left
-            && rms(before) < AS_GOOD * moment.left;
+            && rms(before) < (AS_GOOD * moment.left).max(small);
         let beginning = Beginning {
             time_s: moment.time_s,
             rings_before: true,
@@ -223,13 +249,20 @@ impl<'a> Cutting<'a, '_> {
         Ok(is_good.then_some((found, cut, beginning)))
     }
 
-    /// The fit of the later part, if the earlier one does not lead to it and does not ring at its frequency.
-    fn later(&self, moment: &Onset) -> Result<Option<NewFit<'a>>, FitError> {
+    /// The fit of the later part, if the earlier one does not lead to it and does not ring at its frequency; or, as after
+    /// several rebounds, if that is noise beside few modes while many do not explain both.
+    fn later(&self, moment: &Onset, is_noise: bool) -> Result<Option<NewFit<'a>>, FitError> {
         let stretch = self.stretch();
-        if moment.apart < APART {
+        if !is_noise && moment.apart < APART {
             return Ok(None);
         }
-        if moment.is_long(moment.before) {
+        let (found, cut) = self.search(self.with(&[stretch.later(moment.behind)]))?;
+        if is_noise
+            && (found.fit.poles.len() >= SEVERAL || !leaves_noise(&found.fit, &cut, self.search.0)?)
+        {
+            return Ok(None);
+        }
+        if !is_noise && moment.is_long(moment.before) {
             let (earlier, _) = self.search(vec![stretch.part(0..moment.before)])?;
             let near =
                 |pole: &Pole| (pole.frequency_hz() / moment.frequency_hz - 1.0).abs() < ALIKE;
@@ -237,7 +270,6 @@ impl<'a> Cutting<'a, '_> {
                 return Ok(None);
             }
         }
-        let (found, cut) = self.search(self.with(&[stretch.later(moment.behind)]))?;
         let beginning = Beginning {
             time_s: moment.time_s,
             rings_before: false,

@@ -17,7 +17,7 @@ const MOST_LINES: usize = 8;
 const MOST_PERIODS: usize = 4;
 
 /// Minimum amplitude of one of two modes close together, relative to that of the other.
-const COMPARABLE: f64 = 0.1;
+pub(super) const COMPARABLE: f64 = 0.1;
 
 /// Current state of the search.
 pub(super) struct Attempt<'a> {
@@ -236,4 +236,20 @@ impl<'a> Attempt<'a> {
 fn is_clear(before: &ModesFit, after: &ModesFit, stretches: &[Stretch]) -> bool {
     gain(before, after, stretches) > LEAST_GAIN
         && after.fit.sum_of_squares < 0.98 * before.fit.sum_of_squares
+}
+
+/// Whether the residual of a fit has neither a mode nor a line.
+pub(super) fn leaves_noise(
+    found: &ModesFit,
+    stretches: &[Stretch],
+    few: &ModeSearch,
+) -> Result<bool, FitError> {
+    let left = stretches.iter().zip(&found.residuals);
+    let left = left.map(|(stretch, residuals)| Stretch {
+        values: residuals.clone(),
+        ..stretch.clone()
+    });
+    let mut left: Vec<Stretch> = left.collect();
+    let more = Attempt::of(&mut left, few, &[], true)?;
+    Ok(more.fit.poles.is_empty() && more.lines.is_empty() && !more.has_baseline)
 }

@@ -123,7 +123,7 @@ fn evaluated(
 /// If there are too few samples.
 fn found<'a>(
     stretches: &mut Vec<Stretch>,
-    (wanted, lines): (&'a ModeSearch, &'a [SteadyLine]),
+    (wanted, lines): (&ModeSearch, &'a [SteadyLine]),
 ) -> Result<(Attempt<'a>, Vec<Beginning>), Failure> {
     let recorded = stretches.clone();
     // A fit of many modes takes long, and dry friction looks like many.
@@ -132,13 +132,24 @@ fn found<'a>(
         ..*wanted
     };
     let with_friction = |(one, moving): (ModesFit, Vec<Stretch>), stretches: &mut Vec<Stretch>| {
-        *stretches = moving;
-        (Attempt::with_friction(one, wanted), Vec::new())
+        let two = match wanted.count {
+            None => one_mode::two_instead((&one, &moving), &recorded, (&few, lines))?,
+            Some(_) => None,
+        };
+        let (found, kept) = two.unwrap_or_else(|| (Attempt::with_friction(one, wanted), moving));
+        *stretches = kept;
+        Ok((found, Vec::new()))
     };
     let mut found = search::search(stretches, &few, lines)?;
     if wanted.count.is_none() && found.fit.poles.len() >= few.most {
         if let Some(moving) = one_mode::at_once((&found.fit, stretches), &recorded, &few)? {
-            return Ok(with_friction(moving, stretches));
+            return with_friction(moving, stretches);
+        }
+        // A decay that restarts looks like many modes, too.
+        let (cut, beginnings) = anew::cut(found, stretches, (&few, lines))?;
+        let is_restart = beginnings.iter().all(|beginning| beginning.rings_before);
+        if !beginnings.is_empty() && is_restart && cut.fit.poles.len() < few.most {
+            return Ok((cut, beginnings));
         }
         stretches.clone_from(&recorded);
         found = search::search(stretches, wanted, lines)?;
@@ -157,7 +168,7 @@ fn found<'a>(
         && (is_split || dependence::is_dry(&found.fit, stretches)?)
         && let Some(moving) = one_mode::instead((&found.fit, stretches), &recorded, wanted)?
     {
-        return Ok(with_friction(moving, stretches));
+        return with_friction(moving, stretches);
     }
     Ok((found, beginnings))
 }

@@ -6,11 +6,12 @@
 use num_complex::Complex64;
 use torqcomp_model::fit::FitError;
 
-use super::anew::AS_GOOD;
-use super::attempt::Attempt;
+use super::anew::{AS_GOOD, BETTER};
+use super::attempt::{self, Attempt, COMPARABLE};
 use super::friction::{self, OF_STRETCH, SlidingMotion};
 use super::modes::{self, ModesFit, Stretch};
-use super::search::{ModeSearch, next_pole};
+use super::search::{ModeSearch, largest, next_pole, physical, search};
+use crate::identify::hum::SteadyLine;
 use crate::identify::{Pole, rms};
 
 /// Minimum share of the power explained by several modes, beyond that of one decaying sine, that dry friction explains, too.
@@ -45,15 +46,36 @@ pub(super) fn at_once(
     let Some((one, moving)) = instead(several, recorded, few)? else {
         return Ok(None);
     };
-    let left = moving.iter().zip(&one.residuals);
-    let left = left.map(|(stretch, residuals)| Stretch {
-        values: residuals.clone(),
-        ..stretch.clone()
-    });
-    let mut left: Vec<Stretch> = left.collect();
-    let more = Attempt::of(&mut left, few, &[], true)?;
-    let is_noise = more.fit.poles.is_empty() && more.lines.is_empty() && !more.has_baseline;
+    let is_noise = attempt::leaves_noise(&one, &moving, few)?;
     Ok(is_noise.then_some((one, moving)))
+}
+
+/// Two modes in place of one with dry friction, and their segments, if they leave a clearly smaller residual, which is
+/// noise: two modes close together beat, and their envelope may fall to zero like that of a stand that stops.
+///
+/// # Errors
+/// [`FitError`] if there are too few samples.
+pub(super) fn two_instead<'a>(
+    (one, moving): (&ModesFit, &[Stretch]),
+    recorded: &[Stretch],
+    (wanted, lines): (&ModeSearch, &'a [SteadyLine]),
+) -> Result<Option<(Attempt<'a>, Vec<Stretch>)>, FitError> {
+    let two = ModeSearch {
+        count: Some(SEVERAL),
+        ..*wanted
+    };
+    let mut stretches = recorded.to_vec();
+    let found = search(&mut stretches, &two, lines)?;
+    let sizes = [0, 1].map(|k| match k < found.fit.poles.len() {
+        true => largest(&found.fit, k, &stretches),
+        false => 0.0,
+    });
+    let is_better = while_moving((&found.fit, &stretches), moving) < BETTER * one.fit.rms;
+    let is_taken = is_better
+        && sizes[0].min(sizes[1]) > COMPARABLE * sizes[0].max(sizes[1])
+        && physical(&found.fit, &stretches, &[])
+        && attempt::leaves_noise(&found.fit, &stretches, wanted)?;
+    Ok(is_taken.then_some((found, stretches)))
 }
 
 /// One mode with dry friction, if it describes the recorded segments as well as a fit of several modes or of later parts.

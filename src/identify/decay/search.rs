@@ -1,5 +1,7 @@
 //! Stepwise search for the modes of a decay.
 
+use std::f64::consts::PI;
+
 use torqcomp_dsp::peaks::Peak;
 use torqcomp_model::fit::FitError;
 
@@ -186,11 +188,21 @@ pub(super) fn is_close(a: &Pole, b: &Pole) -> bool {
 /// that rings has a mode, even if the record is too short to determine its damping.
 const DECAYS: [f64; 2] = [1.0, 2.0];
 
-/// Whether every mode except the tones decays significantly, has more than one cycle, and differs from the
-/// others.
+/// Largest relative standard uncertainty of the frequency of any mode but the first.
+const KNOWN: f64 = 0.3;
+
+/// Whether every mode except the tones decays significantly, has more than one cycle, is below half the sampling rate,
+/// and differs from the others.
 pub(super) fn physical(found: &ModesFit, stretches: &[Stretch], tones: &[usize]) -> bool {
     let length = length_s(stretches);
+    let is_all = stretches.iter().all(|s| s.bands_hz.is_empty());
+    let highest = stretches.iter().map(|s| PI * s.rate_hz());
+    let highest = highest.fold(f64::INFINITY, f64::min);
     let one = |(k, pole): (usize, &Pole)| {
+        let natural = pole.omega_rad_per_s.hypot(pole.rate_per_s);
+        let std = found.fit.std[2 * k + 1];
+        let is_vague = k > 0 && std.is_some_and(|std| std > KNOWN * pole.omega_rad_per_s);
+        let is_seen = (!is_all || natural < highest) && !is_vague;
         let rate_std = found.fit.std[2 * k];
         let turns = pole.frequency_hz() * length;
         let least = match k {
@@ -203,7 +215,7 @@ pub(super) fn physical(found: &ModesFit, stretches: &[Stretch], tones: &[usize])
             let near = (other.omega_rad_per_s - pole.omega_rad_per_s).abs();
             near > 0.2 * (other.rate_per_s + pole.rate_per_s) || near * length > 3.0
         });
-        tones.contains(&k) || known && rings && apart
+        tones.contains(&k) || known && rings && apart && is_seen
     };
     found.poles.iter().enumerate().all(one)
 }
@@ -245,7 +257,7 @@ const APART: f64 = 1.5;
 /// Candidate poles of a line.
 fn starts_at(peak: Peak) -> impl Iterator<Item = Pole> {
     let omega = std::f64::consts::TAU * peak.frequency_hz;
-    let wide = std::f64::consts::PI * peak.width_hz;
+    let wide = PI * peak.width_hz;
     [0.05, 0.15, 0.4, 1.0, 2.0].into_iter().flat_map(move |f| {
         [-0.5, 0.0, 0.5].into_iter().map(move |shift| Pole {
             rate_per_s: f * wide,
