@@ -10,15 +10,7 @@ fn torques_act_on_the_first_of_two_inertias() {
     let w = MODE.omega_rad_s;
     let (second_hz, zeta, ratio) = (830.0, 0.03, 0.15);
     let (loss, spring) = (2.0 * zeta * TAU * second_hz, (TAU * second_hz).powi(2));
-    let laws: [(&str, &str, &[f64], &dyn Fn(f64) -> f64); 2] = [
-        ("quadratic-damping", "drag", &[DRAG], &|v| {
-            DRAG * v * v.abs()
-        }),
-        ("coulomb-friction", "tanh", &[0.1, 500.0], &|v| {
-            0.1 * (v / 500.0).tanh()
-        }),
-    ];
-    for (effect, form, values, torque) in laws {
+    let check = |effect: &str, form: &str, values: &[f64], torque: &dyn Fn(f64) -> f64| {
         let truth = oracle(|t, [x, v, y, u]| {
             let pull = loss * (u - v) + spring * (y - x);
             let own = w * w * (input_at(t) - x - torque(v)) - 2.0 * MODE.damping_ratio * w * v;
@@ -28,7 +20,12 @@ fn torques_act_on_the_first_of_two_inertias() {
         let model = chain(&[("second-mode", "coupled", hung), (effect, form, values)]);
         let error = error(&model, &truth, 8);
         assert!(error < 5e-4, "{effect}: {error:e}");
-    }
+    };
+    check("quadratic-damping", "drag", &[DRAG], &|v| {
+        DRAG * v * v.abs()
+    });
+    let friction = |v: f64| 0.1 * (v / 500.0).tanh();
+    check("coulomb-friction", "tanh", &[0.1, 500.0], &friction);
 }
 
 /// Drag beside a springpot, whose stiffness `(jω/ω₀)^α = sin(πα)/π ∫ p^α jω/(jω + p ω₀) dp/p` is a sum of relaxations (F.
