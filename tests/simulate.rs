@@ -386,3 +386,54 @@ fn the_record_can_be_compensated_as_it_is() {
         }
     }
 }
+
+/// Friction acts on the first of two inertias, or beside a springpot, in both directions.
+#[test]
+fn torques_within_the_whole_stand_are_inverted() {
+    let hung = "kind = \"second-mode\"\nform = \"coupled\"\nfrequency = \"900 Hz\"\ndamping_ratio = 0.03\n\
+        inertia_ratio = 0.1\n";
+    let pot = "kind = \"structural-damping\"\nform = \"springpot\"\norder = 0.1\n";
+    let friction = "kind = \"coulomb-friction\"\nform = \"tanh\"\ntorque = \"0.1 N m\"\n\
+        transition_speed = \"300 N m/s\"\n";
+    let ramp = |i: usize| (std::f64::consts::PI * i as f64 / 6000.0).sin().powi(2);
+    let applied: Vec<f64> = input(11, 6000)
+        .iter()
+        .enumerate()
+        .map(|(i, u)| u * ramp(i))
+        .collect();
+    for effect in [hung, pot] {
+        let folder = Folder::new();
+        let stand = format!("{STAND}[[effects]]\n{effect}[[effects]]\n{friction}");
+        folder.write("stand.toml", stand);
+        folder.write("in.csv", record(&applied, &applied));
+        let ran = folder.run(&[
+            "simulate",
+            "in.csv",
+            "--stand",
+            "stand.toml",
+            "--applied",
+            "applied",
+            "-o",
+            "out.csv",
+        ]);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        let ran = folder.run(&[
+            "compensate",
+            "out.csv",
+            "--stand",
+            "stand.toml",
+            "--band",
+            "2000",
+            "-o",
+            "back.csv",
+        ]);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        let (_, back) = table(&folder.read("back.csv"));
+        let (mut left, mut whole) = (0.0, 0.0);
+        for (row, u) in back.iter().zip(&applied).skip(1500).take(3000) {
+            left += (row[1] - u).powi(2);
+            whole += u * u;
+        }
+        assert!(left < 1e-4 * whole, "{effect}: {}", (left / whole).sqrt());
+    }
+}
