@@ -175,26 +175,14 @@ fn sixteen_digits(value: u64) -> u128 {
 /// Eight ASCII digits of a number below 10^8, the first in the lowest byte.
 #[inline(always)]
 fn eight_digits(value: u64) -> u64 {
-    let high = value / 10_000;
-    let low = value - high * 10_000;
-    u64::from(FOUR_DIGITS[high as usize]) | u64::from(FOUR_DIGITS[low as usize]) << 32
+    // Four digits in each 32 bits, then two in each 16, then one in each 8; 10486/2^20 and 103/2^10 are 1/100 and 1/10 for
+    // numbers of four and two digits (P. Khuong, *How to print integers really fast* (2017)).
+    let fours = value / 10_000 | (value % 10_000) << 32;
+    let hundreds = (fours * 10_486) >> 20 & 0x7f_0000_007f;
+    let twos = hundreds | (fours - 100 * hundreds) << 16;
+    let tens = (twos * 103) >> 10 & 0x000f_000f_000f_000f;
+    0x3030_3030_3030_3030 | tens | (twos - 10 * tens) << 8
 }
-
-/// Four ASCII digits of every number below 10^4, the first in the lowest byte.
-static FOUR_DIGITS: [u32; 10_000] = {
-    let mut table = [0; 10_000];
-    let mut value = 0;
-    while value < 10_000 {
-        let n = value as u32;
-        table[value] = 0x3030_3030
-            | (n / 1000)
-            | ((n / 100 % 10) << 8)
-            | ((n / 10 % 10) << 16)
-            | ((n % 10) << 24);
-        value += 1;
-    }
-    table
-};
 
 /// A fixed number of bytes of a text from `at` on, to be set at once: a copy between slices is a call of memmove where
 /// it is not inlined.
