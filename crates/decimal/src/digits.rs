@@ -177,11 +177,11 @@ fn sixteen_digits(value: u64) -> u128 {
 fn eight_digits(value: u64) -> u64 {
     // Four digits in each 32 bits, then two in each 16, then one in each 8; 10486/2^20 and 103/2^10 are 1/100 and 1/10 for
     // numbers of four and two digits (P. Khuong, *How to print integers really fast* (2017)).
-    let fours = value / 10_000 | (value % 10_000) << 32;
-    let hundreds = (fours * 10_486) >> 20 & 0x7f_0000_007f;
-    let twos = hundreds | (fours - 100 * hundreds) << 16;
-    let tens = (twos * 103) >> 10 & 0x000f_000f_000f_000f;
-    0x3030_3030_3030_3030 | tens | (twos - 10 * tens) << 8
+    let fours = (value / 10_000) | ((value % 10_000) << 32);
+    let hundreds = ((fours * 10_486) >> 20) & 0x7f_0000_007f;
+    let twos = hundreds | ((fours - 100 * hundreds) << 16);
+    let tens = ((twos * 103) >> 10) & 0x000f_000f_000f_000f;
+    0x3030_3030_3030_3030 | tens | ((twos - 10 * tens) << 8)
 }
 
 /// A fixed number of bytes of a text from `at` on, to be set at once: a copy between slices is a call of memmove where
