@@ -107,19 +107,9 @@ impl fmt::Display for Fault {
 }
 
 impl Failure {
-    /// A failure of the work.
-    fn failed(code: ErrorCode, message: impl fmt::Display) -> Self {
-        Self::Failed(Fault::new(code, message))
-    }
-
     /// A failure of the work caused by another error.
     pub fn of<E: fmt::Display>(code: ErrorCode) -> impl Fn(E) -> Self {
         move |error| code.failed(error)
-    }
-
-    /// A wrong command line.
-    fn usage(code: ErrorCode, message: impl fmt::Display) -> Self {
-        Self::Usage(Fault::new(code, message))
     }
 
     /// A failure to write to `place`.

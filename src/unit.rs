@@ -111,10 +111,10 @@ impl RecordedChannel<'_> {
             },
         );
         Some(ErrorCode::UnitUnclear.failed(format_args!(
-                "the channel \"{}\" is in \"{text}\", which can be read with a force or with a mass; {torque}; \
-                 \"{mass}\" cannot be converted to torque",
-                self.name
-            )))
+            "the channel \"{}\" is in \"{text}\", which can be read with a force or with a mass; {torque}; \
+             \"{mass}\" cannot be converted to torque",
+            self.name
+        )))
     }
 }
 

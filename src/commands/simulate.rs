@@ -338,10 +338,10 @@ fn applied_unit(
             let unclear = is_weight.then(|| chosen.unclear_weight(given)).flatten();
             Err(unclear.unwrap_or_else(|| {
                 ErrorCode::UnitUnsuitable.failed(format_args!(
-                        "the channel \"{}\" is in {}, and what acts on this stand is in {expected}; choose another \
-                         column with --applied, or give the right unit with --unit",
-                        chosen.name, given.text
-                    ))
+                    "the channel \"{}\" is in {}, and what acts on this stand is in {expected}; choose another \
+                     column with --applied, or give the right unit with --unit",
+                    chosen.name, given.text
+                ))
             }))
         }
         (None, Some(text)) => Err(chosen.unknown_unit(

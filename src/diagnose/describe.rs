@@ -252,8 +252,11 @@ pub fn shows_torque(over_displacement: bool) -> &'static str {
 pub fn warnings(found: &SearchState, verdict: Verdict) -> Vec<Warning> {
     let before = &found.before;
     if found.refit_diverges {
-        return vec![WarningCode::DeclaredNotRefitted.warning("with only the declared effects, the refitted stand diverges on the hold-out records; \"before\" is the stand \
-             file as it is")];
+        let diverges = WarningCode::DeclaredNotRefitted.warning(
+            "with only the declared effects, the refitted stand diverges on the hold-out records; \"before\" is the stand \
+             file as it is",
+        );
+        return vec![diverges];
     }
     let is_open = matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained);
     let apart = is_open.then(|| records_apart(before)).flatten();
@@ -305,16 +308,16 @@ fn apart([train, holdout]: &[PlainStand; 2]) -> String {
 fn uncertain_constants(found: &SearchState) -> Option<Warning> {
     if let Some(open) = open_constants(&found.before) {
         return Some(WarningCode::TrainingLeavesConstantsOpen.warning(format!(
-                "the training records determine {open}: that, and not a missing effect, may cause the hold-out error; \
-                 train on records that excite the resonance"
-            )));
+            "the training records determine {open}: that, and not a missing effect, may cause the hold-out error; \
+             train on records that excite the resonance"
+        )));
     }
     let open = open_constants(&found.after)?;
     Some(WarningCode::EffectsLeaveConstantsOpen.warning(format!(
-            "with {}, the training records determine {open}: the effects make up for wrong constants, and their parameters \
-             are as uncertain; keep the constants from a record without them, or train on more levels",
-            found.after.effect_names().join(" and ")
-        )))
+        "with {}, the training records determine {open}: the effects make up for wrong constants, and their parameters \
+         are as uncertain; keep the constants from a record without them, or train on more levels",
+        found.after.effect_names().join(" and ")
+    )))
 }
 
 /// The constants that a fit leaves open, as text.

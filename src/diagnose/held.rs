@@ -108,15 +108,15 @@ fn warning(context: &FitContext, stiffness: f64) -> Warning {
     let [acting, moved] = units.map_or(["", ""], |u| [u.applied.as_str(), u.measured.as_str()]);
     let factors = units.map_or([1.0; 2], |u| u.factors);
     WarningCode::FreeBody.warning(format!(
-            "the body moves freely: a spring of its own would take less than {} % of what is applied. To keep model \
-             and motion together, a spring of {} {} per {} ({} Hz) ties both to the measured motion: errors and noise \
-             are those of the applied quantity below that frequency",
-            rounded(100.0 * SMALL_SPRING, 2),
-            rounded(stiffness * factors[1] / factors[0], 4),
-            unit_or_as_recorded(acting),
-            unit_or_as_recorded(moved),
-            rounded(natural_hz, 3),
-        ))
+        "the body moves freely: a spring of its own would take less than {} % of what is applied. To keep model \
+         and motion together, a spring of {} {} per {} ({} Hz) ties both to the measured motion: errors and noise \
+         are those of the applied quantity below that frequency",
+        rounded(100.0 * SMALL_SPRING, 2),
+        rounded(stiffness * factors[1] / factors[0], 4),
+        unit_or_as_recorded(acting),
+        unit_or_as_recorded(moved),
+        rounded(natural_hz, 3),
+    ))
 }
 
 /// RMS of several series together, each about its mean.

@@ -85,8 +85,10 @@ impl SearchState {
         let declared = self.declared.as_ref().filter(with_effects);
         self.refit_diverges = true;
         declared.and_then(|model| self.held_out(model)).ok_or_else(|| {
-            ErrorCode::NotIdentifiable.failed("the plain stand cannot be simulated on the hold-out records; if the stand file has [[effects]], diagnose \
-                 without one or all of them")
+            ErrorCode::NotIdentifiable.failed(
+                "the plain stand cannot be simulated on the hold-out records; if the stand file has [[effects]], diagnose \
+                 without one or all of them",
+            )
         })
     }
 

@@ -203,14 +203,16 @@ impl Diagnosis {
             return Ok(());
         }
         if self.context().held.is_some() {
-            return Err(ErrorCode::UnsuitableRecord.failed("--static does not apply: the body moves freely and does not come to rest under a constant load"));
+            return Err(ErrorCode::UnsuitableRecord.failed(
+                "--static does not apply: the body moves freely and does not come to rest under a constant load",
+            ));
         }
         let follow = |fitted: &FittedModel| {
             LoadFit::of_model(loads, fitted).map_err(|error| {
                 ErrorCode::NotIdentifiable.failed(format_args!(
-                        "the loads of --static do not determine a gain ({error}): the reading does not follow them, or \
-                         the recorded quantity does not show constant loads"
-                    ))
+                    "the loads of --static do not determine a gain ({error}): the reading does not follow them, or \
+                     the recorded quantity does not show constant loads"
+                ))
                 .at(&loads[0].source)
             })
         };
@@ -263,9 +265,9 @@ fn contradicted(
     let law = FisherSnedecor::new(freedom, freedom).ok()?;
     (ratio.is_finite() && law.sf(ratio) < BY_CHANCE).then(|| {
         WarningCode::LoadsContradictEffects.warning(format!(
-                "the known loads do not confirm {}: the error under the loads is {} times that of a straight line",
-                effects.join(" and "),
-                rounded(ratio.sqrt(), 3)
-            ))
+            "the known loads do not confirm {}: the error under the loads is {} times that of a straight line",
+            effects.join(" and "),
+            rounded(ratio.sqrt(), 3)
+        ))
     })
 }

@@ -73,10 +73,10 @@ fn refuse_short(case: &Case, context: &FitContext) -> Result<(), Failure> {
         return Ok(());
     }
     Err(ErrorCode::TooFewSamples.failed(format_args!(
-            "{duration_s:.4} s are only {periods:.1} periods of the fitted natural frequency ({natural_hz:.4} Hz); \
-             at least one training record must have {FEWEST_PERIODS} periods. Record for longer, or, for a stand \
-             that turns freely, use \"identify runup\""
-        ))
+        "{duration_s:.4} s are only {periods:.1} periods of the fitted natural frequency ({natural_hz:.4} Hz); \
+         at least one training record must have {FEWEST_PERIODS} periods. Record for longer, or, for a stand \
+         that turns freely, use \"identify runup\""
+    ))
     .at(&record.source))
 }
 
@@ -128,12 +128,12 @@ fn refuse_sign_or_unit(case: &Case, context: &FitContext, as_given: f64) -> Resu
         )
     };
     Err(ErrorCode::UnsuitableRecord.failed(format_args!(
-            "{}: the measured torque {what}: a stand fitted to it as it is has an error of {}, one with that factor {}; \
-         {remedy}",
-            train[0].source,
-            relative(as_given, 2),
-            relative(scaled, 2)
-        )))
+        "{}: the measured torque {what}: a stand fitted to it as it is has an error of {}, one with that factor {}; \
+     {remedy}",
+        train[0].source,
+        relative(as_given, 2),
+        relative(scaled, 2)
+    )))
 }
 
 fn refuse_swapped(case: &Case, context: &FitContext, as_given: f64) -> Result<(), Failure> {
@@ -159,11 +159,11 @@ fn refuse_swapped(case: &Case, context: &FitContext, as_given: f64) -> Result<()
         return Ok(());
     }
     Err(ErrorCode::UnsuitableRecord.failed(format_args!(
-            "the channels look swapped: a stand from --applied to --measured has an error of {}, one from \
-             --measured to --applied {}; exchange the two",
-            relative(as_given, 2),
-            relative(the_other_way, 2)
-        ))
+        "the channels look swapped: a stand from --applied to --measured has an error of {}, one from \
+         --measured to --applied {}; exchange the two",
+        relative(as_given, 2),
+        relative(the_other_way, 2)
+    ))
     .at(&train[0].source))
 }
 

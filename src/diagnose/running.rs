@@ -170,18 +170,18 @@ impl Diagnosis {
         };
         (error > DIFFER.1).then(|| {
             WarningCode::RunningDiffers.warning(format!(
-                    "{}: in use, the stand has a natural frequency of {} Hz and a damping ratio of {}; the fitted \
-                     stand has {} Hz and {}. A torque compensated with the fitted stand is off by up to {} near the \
-                     resonance. Possible causes: clamping, temperature, mounted parts or size of the motion differ \
-                     (fit records taken under the conditions of use), or an order or another peak of the torque lies \
-                     there (compare with a record at another speed)",
-                    record.source,
-                    shown(&found.natural_frequency),
-                    shown(&found.damping_ratio),
-                    shown(&frequency),
-                    shown(&ratio),
-                    relative(error, 2),
-                ))
+                "{}: in use, the stand has a natural frequency of {} Hz and a damping ratio of {}; the fitted \
+                 stand has {} Hz and {}. A torque compensated with the fitted stand is off by up to {} near the \
+                 resonance. Possible causes: clamping, temperature, mounted parts or size of the motion differ \
+                 (fit records taken under the conditions of use), or an order or another peak of the torque lies \
+                 there (compare with a record at another speed)",
+                record.source,
+                shown(&found.natural_frequency),
+                shown(&found.damping_ratio),
+                shown(&frequency),
+                shown(&ratio),
+                relative(error, 2),
+            ))
         })
     }
 }

@@ -249,7 +249,8 @@ impl SearchState {
     }
 
     /// Whether a model leaves enough for another effect: something above the noise, more of it in the training records, or
-    /// a residual that is not just noise and exceeds the differences between periods. A rounding error is neither white nor independent of the input.
+    /// a residual that is not just noise and exceeds the differences between periods. A rounding error is neither white nor
+    /// independent of the input.
     pub(super) fn is_worthwhile(&self, model: &ScoredModel, tests: &ResidualTests) -> bool {
         let floor = self.noise_floor;
         if floor.is_some_and(NoiseFloor::is_rounding) {

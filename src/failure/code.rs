@@ -5,7 +5,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::Failure;
+use super::{Failure, Fault};
 
 /// Kind of a failure: a stable name, whatever the words of the message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
@@ -84,11 +84,11 @@ pub enum ErrorCode {
 impl ErrorCode {
     /// A failure of the work.
     pub fn failed(self, message: impl fmt::Display) -> Failure {
-        Failure::failed(self, message)
+        Failure::Failed(Fault::new(self, message))
     }
 
     /// A wrong command line.
     pub fn usage(self, message: impl fmt::Display) -> Failure {
-        Failure::usage(self, message)
+        Failure::Usage(Fault::new(self, message))
     }
 }

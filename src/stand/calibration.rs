@@ -346,13 +346,13 @@ fn without_unit(channel: RecordedChannel) -> Failure {
     }
     match channel.unit_text {
         None => ErrorCode::UnitUnclear.failed(format_args!(
-                "the channel \"{name}\" has no unit; give it: --unit V for the output of an amplifier or recorder \
-                 (likewise mV/V, mA, Hz, ustrain), --unit \"N m\" (or N) for a torque (or force), as from simulate"
-            )),
+            "the channel \"{name}\" has no unit; give it: --unit V for the output of an amplifier or recorder \
+             (likewise mV/V, mA, Hz, ustrain), --unit \"N m\" (or N) for a torque (or force), as from simulate"
+        )),
         Some(OF_FULL_SCALE) => ErrorCode::UnitUnclear.failed(format_args!(
-                "the samples of the channel \"{name}\" are fractions of full scale, which the file does not state; \
-                 give it with its unit, as --full-scale \"10 V\""
-            )),
+            "the samples of the channel \"{name}\" are fractions of full scale, which the file does not state; \
+             give it with its unit, as --full-scale \"10 V\""
+        )),
         Some(text) => channel.unknown_unit(
             text,
             "give a known one with --unit, such as V, mV/V, \"N m\"",
@@ -365,17 +365,17 @@ fn no_torque(channel: RecordedChannel, named: &NamedUnit) -> Failure {
     let (name, text) = (channel.name, &named.text);
     if named.unit.ratio_of() == Some(RatioOf::Anything) {
         return ErrorCode::UnitUnclear.failed(format_args!(
-                "the channel \"{name}\" is in \"{text}\", which could be bridge output over excitation, a strain, \
-                 or a fraction of full scale; give --unit \"{text} V/V\" for the first or \"{text} strain\" for the \
-                 second"
-            ));
+            "the channel \"{name}\" is in \"{text}\", which could be bridge output over excitation, a strain, \
+             or a fraction of full scale; give --unit \"{text} V/V\" for the first or \"{text} strain\" for the \
+             second"
+        ));
     }
     if let Some(unclear) = channel.unclear_weight(named) {
         return unclear;
     }
     ErrorCode::UnitUnsuitable.failed(format_args!(
-            "the channel \"{name}\" is in \"{text}\" ({}), which cannot be converted to torque; expected volts, \
-             mV/V, mA, Hz, strain, torque or force",
-            named.unit.dimension()
-        ))
+        "the channel \"{name}\" is in \"{text}\" ({}), which cannot be converted to torque; expected volts, \
+         mV/V, mA, Hz, strain, torque or force",
+        named.unit.dimension()
+    ))
 }

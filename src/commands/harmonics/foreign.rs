@@ -7,7 +7,7 @@ use torqcomp_dsp::harmonics::{Fundamental, fit};
 use torqcomp_dsp::store::SampleStore;
 
 use super::rotation::Rotation;
-use super::speed::{FIRST, angles_by_order, mean_variance, without_line};
+use super::speed::{FIRST, StraightLine, angles_by_order, mean_variance};
 use super::{mains, named};
 use crate::print::{enumeration, rounded, short};
 use crate::warning::{Warning, WarningCode};
@@ -54,19 +54,15 @@ fn lines(samples: &[f64], rate_hz: f64, hz: f64, orders: &[f64]) -> Option<Vec<O
     let fundamental = Fundamental::given(hz);
     let whole = fit(samples, rate_hz, 0.0, fundamental, orders).ok()?;
     let shown = angles_by_order(samples, rate_hz, fundamental, &whole, WINDOWS)?;
-    let middle = 0.5 * (WINDOWS - 1) as f64;
     let line = |(k, order): (usize, &f64)| {
         let own: Vec<[f64; 2]> = shown.iter().map(|at| at[k]).collect::<Option<_>>()?;
-        let variance = without_line(&own);
-        let places = (0..WINDOWS).map(|i| i as f64 - middle);
-        let squares: f64 = places.clone().map(|x| x * x).sum();
-        let products: f64 = places.zip(&own).map(|(x, [angle, _])| x * angle).sum();
+        let through = StraightLine::through(&own);
         // From radians of the shaft per part to cycles of the order over the record.
         let turns = order * WINDOWS as f64 / TAU;
-        let std_rad = (variance.max(mean_variance(&own)) / squares).sqrt();
-        (order * variance.sqrt() < STEADY_RAD).then_some(OrderLine {
+        let std_rad = (through.variance.max(mean_variance(&own)) / through.squares).sqrt();
+        (order * through.variance.sqrt() < STEADY_RAD).then_some(OrderLine {
             order: *order,
-            turns: turns * products / squares,
+            turns: turns * through.slope,
             std_turns: turns * std_rad,
         })
     };
@@ -138,13 +134,13 @@ impl ForeignLines {
             _ => ("lines", "are no orders, and make those components wrong"),
         };
         WarningCode::LineBesideOrder.warning(format!(
-                "{is} at {} Hz beside {} of {} Hz {wrong}: the other orders agree with one speed, at which it lies \
-                 between orders; add {} to --orders to separate them, or record for longer",
-                enumeration(&list(&|line| rounded(own_hz(line), 5)), "and"),
-                named(&list(&|line| short(line.order))),
-                rounded(hz, 7),
-                enumeration(&list(&|line| rounded(own_hz(line) / hz, 6)), "and"),
-            ))
+            "{is} at {} Hz beside {} of {} Hz {wrong}: the other orders agree with one speed, at which it lies \
+             between orders; add {} to --orders to separate them, or record for longer",
+            enumeration(&list(&|line| rounded(own_hz(line), 5)), "and"),
+            named(&list(&|line| short(line.order))),
+            rounded(hz, 7),
+            enumeration(&list(&|line| rounded(own_hz(line) / hz, 6)), "and"),
+        ))
     }
 }
 

@@ -195,13 +195,16 @@ fn sways_by(orders: &[f64], shown: &[Vec<Option<[f64; 2]>>]) -> Option<Warning> 
         (sums[1] > 0.0).then(|| [sums[0] / sums[1], 1.0 / sums[1]])
     };
     let angles: Vec<[f64; 2]> = shown.iter().map(mean_angle).collect::<Option<_>>()?;
-    let (variance, noise) = (without_line(&angles), mean_variance(&angles));
+    let (variance, noise) = (
+        StraightLine::through(&angles).variance,
+        mean_variance(&angles),
+    );
     // A line beside one order moves only the angle by that one.
     let contradicts = |k: usize| {
         let own: Option<Vec<[f64; 2]>> = shown.iter().map(|angles| angles[k]).collect();
         own.is_some_and(|own| {
             let noise = SWAYS * mean_variance(&own);
-            without_line(&own) < noise && noise < variance
+            StraightLine::through(&own).variance < noise && noise < variance
         })
     };
     if (0..orders.len()).any(contradicts) {
@@ -290,21 +293,35 @@ pub(super) fn mean_variance(values: &[[f64; 2]]) -> f64 {
     values.iter().map(|[_, variance]| variance).sum::<f64>() / values.len() as f64
 }
 
-/// Variance of values about a straight line.
-pub(super) fn without_line(values: &[[f64; 2]]) -> f64 {
-    let count = values.len() as f64;
-    let middle = 0.5 * (count - 1.0);
-    let mean = values.iter().map(|[y, _]| y).sum::<f64>() / count;
-    let (mut products, mut squares) = (0.0, 0.0);
-    for (i, [y, _]) in values.iter().enumerate() {
-        let x = i as f64 - middle;
-        products += x * (y - mean);
-        squares += x * x;
+/// A straight line through values of uncertain size, over their places.
+pub(super) struct StraightLine {
+    pub slope: f64,
+    /// Sum of the squares of the places about their mean.
+    pub squares: f64,
+    /// Variance of the values about the line.
+    pub variance: f64,
+}
+
+impl StraightLine {
+    pub fn through(values: &[[f64; 2]]) -> Self {
+        let count = values.len() as f64;
+        let middle = 0.5 * (count - 1.0);
+        let mean = values.iter().map(|[y, _]| y).sum::<f64>() / count;
+        let (mut products, mut squares) = (0.0, 0.0);
+        for (i, [y, _]) in values.iter().enumerate() {
+            let x = i as f64 - middle;
+            products += x * (y - mean);
+            squares += x * x;
+        }
+        let slope = products / squares;
+        let left = values.iter().enumerate();
+        let left = left.map(|(i, [y, _])| (y - mean - slope * (i as f64 - middle)).powi(2));
+        Self {
+            slope,
+            squares,
+            variance: left.sum::<f64>() / (count - 2.0),
+        }
     }
-    let slope = products / squares;
-    let left = values.iter().enumerate();
-    let left = left.map(|(i, [y, _])| (y - mean - slope * (i as f64 - middle)).powi(2));
-    left.sum::<f64>() / (count - 2.0)
 }
 
 /// Number of pieces of the record whose mean torques are compared.

@@ -12,30 +12,26 @@ impl Chain {
     pub(super) fn with_links_within(mut self) -> Self {
         for link in &mut self.links {
             let nothing = Action::Factor(Box::new(|_, _| Complex64::ONE));
-            match &link.action {
-                Action::Body { coupled, .. } => {
-                    if let Some(stand) = coupled(&self.stand) {
+            link.action = match std::mem::replace(&mut link.action, nothing) {
+                Action::Body { factor, coupled } => match coupled(&self.stand) {
+                    Some(stand) => {
                         self.stand = stand;
-                        link.action = nothing;
+                        continue;
                     }
-                }
-                Action::Stiffness(change) => {
-                    let Some(stiffened) = self.stand.stiffened(change) else {
-                        continue;
-                    };
-                    let plain = std::mem::replace(&mut self.stand, stiffened);
-                    let Action::Stiffness(change) = std::mem::replace(&mut link.action, nothing)
-                    else {
-                        continue;
-                    };
-                    link.action = Action::Factor(Box::new(move |stand, omega| {
-                        let inverse =
-                            plain.inverse_with(omega, |mode, own| change(mode, omega, own));
-                        (inverse * stand.response(omega)).inv()
-                    }));
-                }
-                _ => {}
-            }
+                    None => Action::Body { factor, coupled },
+                },
+                Action::Stiffness(change) => match self.stand.stiffened(&change) {
+                    Some(stiffened) => {
+                        let plain = std::mem::replace(&mut self.stand, stiffened);
+                        Action::Factor(Box::new(move |stand, omega| {
+                            let own = |mode: &_, own| change(mode, omega, own);
+                            (plain.inverse_with(omega, own) * stand.response(omega)).inv()
+                        }))
+                    }
+                    None => Action::Stiffness(change),
+                },
+                other => other,
+            };
         }
         self
     }

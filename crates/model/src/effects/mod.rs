@@ -6,7 +6,7 @@
 //! | place | what it does |
 //! |---|---|
 //! | [`Stage::Stand`] | a torque `n(x, x', z)` added to `x`, in record units: `x'' + 2ζω₀ x' + ω₀² (x + n) = ω₀² G u` |
-//! | [`Stage::Dynamics`] | a factor or a term of the linear response; a coupled body and a changed stiffness are part of the motion on which torques act ([`Chain::with_links`](crate::Chain::with_links)) |
+//! | [`Stage::Dynamics`] | a factor or a term of the linear response, or a part of the motion on which torques act |
 //! | [`Stage::Chain`] | the effect of gage, amplifier and recorder on `x` |
 //! | [`Stage::Disturbance`] | an added signal independent of `u` |
 //!

@@ -1,9 +1,9 @@
 //! Time integration of `x'' + 2ζω₀ x' + ω₀² (x + n(x, x', z)) = ω₀² G u`.
 //!
 //! The linear part is exact: from node to node by the matrix exponential, with the input between nodes constant, straight,
-//! or as a cubic through four of them. The torques `n` act at the nodes (`run`; `modes` for several modes), each for a whole step
-//! (Strang splitting, SIAM J. Numer. Anal. 5 (1968), 506): second order in the step, stable for linear terms of any
-//! size, and a switching torque follows its own exact flow.
+//! or as a cubic through four of them. The torques `n` act at the nodes (`run`; `modes` for several modes), each for a
+//! whole step (Strang splitting, SIAM J. Numer. Anal. 5 (1968), 506): second order in the step, stable for linear terms
+//! of any size, and a switching torque follows its own exact flow.
 
 use num_complex::Complex64;
 
@@ -131,6 +131,7 @@ impl LinearStep {
                 return step;
             }
         };
+        // Beyond that the quadrature is not exact; for shorter steps the closed form loses digits.
         if between == Between::StraightLines && mode.omega_rad_s * step_s > LARGEST_STEP {
             let (held, ramp) = (step.held(gain), step.ramp(mode, gain, step_s));
             step.of_input[1] = [held[0] - ramp[0], held[1] - ramp[1]];

@@ -40,17 +40,17 @@ impl Sources<'_> {
         );
         (counts && 2 * jumps.len() < values.len()).then(|| {
             WarningCode::CounterJumps.warning(format!(
-                    "\"{}\" counts the rows and jumps {} (first after {}): {} missing, and at a constant rate all \
-                     that follows is too early; select a part without jumps with --range, or write the count divided by the \
-                     rate into a column of time, and give --fill in place of --rate",
-                    field.heading,
-                    plural(jumps.len(), "time"),
-                    short(first.0),
-                    match lost as usize {
-                        1 => "1 row is".to_owned(),
-                        lost => format!("{lost} rows are"),
-                    },
-                ))
+                "\"{}\" counts the rows and jumps {} (first after {}): {} missing, and at a constant rate all \
+                 that follows is too early; select a part without jumps with --range, or write the count divided by the \
+                 rate into a column of time, and give --fill in place of --rate",
+                field.heading,
+                plural(jumps.len(), "time"),
+                short(first.0),
+                match lost as usize {
+                    1 => "1 row is".to_owned(),
+                    lost => format!("{lost} rows are"),
+                },
+            ))
         })
     }
 
@@ -62,12 +62,12 @@ impl Sources<'_> {
             .find_map(|place| Some((*place, self.cycle(*place)?)))?;
         let values: Vec<String> = sources.iter().map(|value| short(*value)).collect();
         Some(WarningCode::TwoSignals.warning(format!(
-                "\"{}\" cycles through {} row by row: the rows belong to {} sources in turn, and every other column mixes \
-                 their signals; split the file by this column, and give the rows of one source",
-                self.fields[place].heading,
-                enumeration(&values, "and"),
-                sources.len()
-            )))
+            "\"{}\" cycles through {} row by row: the rows belong to {} sources in turn, and every other column mixes \
+             their signals; split the file by this column, and give the rows of one source",
+            self.fields[place].heading,
+            enumeration(&values, "and"),
+            sources.len()
+        )))
     }
 
     /// The different whole numbers through which a column cycles.

@@ -82,13 +82,13 @@ impl Sources<'_> {
             let seconds = named.filter(|named| named.is_time())?.unit.factor();
             let faster = faster(&self.columns[*place].values, seconds, &stamps)?;
             Some(WarningCode::ClocksDisagree.warning(format!(
-                    "\"{}\" runs {} % {} than \"{}\", the time of the rows: find out which clock is right, and choose it \
-                     with --time-column",
-                    self.fields[*place].heading,
-                    rounded(100.0 * faster.abs(), 2),
-                    if faster > 0.0 { "faster" } else { "slower" },
-                    rule.heading
-                )))
+                "\"{}\" runs {} % {} than \"{}\", the time of the rows: find out which clock is right, and choose it \
+                 with --time-column",
+                self.fields[*place].heading,
+                rounded(100.0 * faster.abs(), 2),
+                if faster > 0.0 { "faster" } else { "slower" },
+                rule.heading
+            )))
         };
         others.filter_map(warning).collect()
     }
