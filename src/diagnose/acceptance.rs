@@ -65,6 +65,11 @@ fn no_gain_by(
     None
 }
 
+/// Whether held-out records bear out, with 95 % confidence, that a model is better than a simpler one.
+pub fn is_confirmed(model: &ScoredModel, before: &ScoredModel) -> bool {
+    model.against(before).significance() >= CERTAIN
+}
+
 /// Ratio of a gain, for the number of parameters and samples, to what [`refusal`] requires, whatever the noise, with 95
 /// % confidence.
 pub fn evidence(comparison: &Comparison, samples: usize, parameters: usize) -> f64 {

@@ -64,8 +64,9 @@ impl SearchState {
     /// The best model with one effect exchanged or refitted, if it is better than the current one, or as good and first
     /// in the list; what only takes out noise on the applied quantity is no reason for more parameters. While a residual
     /// remains, or if the effect lacks what makes it one, any may replace it; otherwise only one that resembles it.
+    /// Models with one that resembles it are kept, as they may explain the records equally well.
     fn other_effects(
-        &self,
+        &mut self,
         seen: &[Vec<&'static str>],
         coarse: usize,
         workers: Workers,
@@ -80,7 +81,7 @@ impl SearchState {
         let silent = workers.silent();
         let without = self.after.without_each(&self.records, workers.threads);
         let noise = AppliedNoise::of(&self.records);
-        let mut found = Vec::new();
+        let (mut found, mut alike) = (Vec::new(), Vec::new());
         for (k, (form, less)) in present.iter().zip(without).enumerate() {
             let Some(less) = less else { continue };
             // Without what makes it this effect, it only has the shape of another.
@@ -96,6 +97,8 @@ impl SearchState {
                 let among = |e: &Effect| !is_alike(e);
                 try_effects(&base, among, &FOR_EXCHANGE, &self.records, silent)
             });
+            let models = round.tried.iter().filter_map(|c| c.model.clone());
+            alike.extend(models.map(ScoredModel::without_samples));
             let tried = round.tried.into_iter();
             let tried = tried.chain(others.into_iter().flat_map(|others| others.tried));
             let passes = |model: &ScoredModel| refusal(model, &less).is_none();
@@ -122,7 +125,9 @@ impl SearchState {
             !seen.contains(&names) || is_last && model.criterion() < self.after.criterion() - SAME
         };
         let found = found.into_iter().filter(is_new);
-        found.min_by(|a, b| a.criterion().total_cmp(&b.criterion()))
+        let best = found.min_by(|a, b| a.criterion().total_cmp(&b.criterion()));
+        self.alike.extend(alike);
+        best
     }
 
     /// Whether a model with one effect in place of another is better than the current one.
@@ -211,27 +216,28 @@ impl SearchState {
         }
     }
 
-    /// Reports an effect that was exchanged for another although the records do not distinguish them.
+    /// Reports an effect that was exchanged for another, or could be, although the records do not distinguish them.
     pub(super) fn report_exchanged(&mut self) {
         let names = self.after.effect_names();
-        for model in std::mem::take(&mut self.path) {
+        let alike = std::mem::take(&mut self.alike);
+        for model in self.path.iter().chain(&alike) {
             let of_model = model.effect_names();
             let [gone, new] = [(&of_model, &names), (&names, &of_model)].map(|(some, others)| {
                 let mut own = some.iter().filter(|name| !others.contains(name));
                 own.next().filter(|_| own.next().is_none())
             });
-            let count = model.parameter_count();
+            // What the records keep of their history says nothing of the effect.
+            let count = |model: &ScoredModel| model.fitted.values.len();
             if let (Some(gone), Some(best)) = (gone, new)
-                && count <= self.after.parameter_count()
+                && count(model) <= count(&self.after)
                 && model.clone().with_samples().is_no_worse_than(&self.after)
             {
                 let entries = self.rounds.iter_mut().flatten().rev();
                 let mut entries = entries.filter(|c| c.model.is_some());
                 if let Some(entry) = entries.find(|c| c.effect.name == *gone) {
-                    entry.exchange(&model, best);
+                    entry.exchange(model, best);
                 }
             }
-            self.path.push(model);
         }
     }
 
@@ -247,10 +253,7 @@ impl SearchState {
     fn with_gain(&self, workers: Workers) -> Option<ScoredModel> {
         let gain = listed(&self.after.fitted.structure).find(|effect| effect.name == GAIN);
         let effect = gain.filter(|_| self.has_room())?;
-        let gain = EffectForm {
-            effect,
-            form: &effect.forms[0],
-        };
+        let gain = EffectForm::new(effect, &effect.forms[0]);
         let starts = self.after.with_gain_in_other_forms(gain);
         self.best_from(&starts, workers, |model| {
             refusal(model, &self.after).is_none() && !self.excess().is_too_small(&self.after, model)

@@ -141,6 +141,8 @@ struct SearchState {
     rounds: Vec<Vec<CandidateFit>>,
     /// Intermediate models with effects.
     path: Vec<ScoredModel>,
+    /// Models with an effect exchanged for one that resembles it, until those that are as good are reported.
+    alike: Vec<ScoredModel>,
     /// Contribution of each effect.
     ladder: Ladder,
     /// A guard model that explains more than each candidate of the last round.
@@ -286,6 +288,7 @@ impl SearchState {
             rivals: None,
             rounds: Vec::new(),
             path: Vec::new(),
+            alike: Vec::new(),
             ladder: Ladder::default(),
             suspected: None,
             surface: None,

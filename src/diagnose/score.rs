@@ -209,16 +209,24 @@ impl ScoredModel {
     }
 
     /// Number of parameters, including amplitudes of lines, and on each training record their phases, slow trends, what
-    /// remains of its history, and the constant load.
+    /// remains of its history, and the constant load. Of the amplitudes of decays, which few samples determine, as many
+    /// as have the same information: `Σ ln(n_k)/ln(n)` for decays over `n_k` of `n` samples.
     pub fn parameter_count(&self) -> usize {
         let (model, terms) = self.fitted.structure.model(&self.fitted.values);
         let records = self.train.records().len();
         let driven = self.train.records().iter().filter(|r| !r.is_free());
-        let of_each = terms.lines_hz.len() + terms.drift_half_waves + terms.decays_per_s.len();
+        let of_each = terms.lines_hz.len() + terms.drift_half_waves;
+        let decays = self.train.records().iter().map(|record| {
+            let samples = |rate_per_s: &f64| record.rate_hz() / rate_per_s;
+            let of = |samples: f64| samples.clamp(1.0, record.count() as f64).ln();
+            terms.decays_per_s.iter().map(samples).map(of).sum::<f64>()
+        });
+        let decays = decays.sum::<f64>() / (self.train.count() as f64).ln();
         self.fitted.values.len()
             + OwnOfRecords::preloaded(&model, records).len()
             + self.fitted.amplitudes.len()
             + of_each * records
+            + decays.round() as usize
             + 2 * terms.ringing.len() * driven.count()
             + self.parameters_of_spikes()
     }
@@ -248,6 +256,7 @@ impl ScoredModel {
         let own_effect = &structure.effects[effect];
         let parameters = &own_effect.form.parameters[..own_effect.moved()];
         let own = || parameters.iter().enumerate();
+        let is_shown = own_effect.outdoes_special_cases;
         let is_zero = |k: usize| {
             let value = fitted.values[first + k];
             let is_at_bound = value >= (1.0 - AT_BOUND) * parameters[k].upper;
@@ -263,7 +272,7 @@ impl ScoredModel {
             std.is_some_and(|std| fitted.values[first + k].abs() < std)
         };
         own()
-            .find(|(k, p)| p.essential && is_zero(*k) || is_no_size(*k))
+            .find(|(k, p)| p.essential && !is_shown && is_zero(*k) || is_no_size(*k))
             .map(|(_, p)| p.name)
     }
 

@@ -2,7 +2,7 @@
 //! guard models may contradict the remainder.
 
 use super::SearchState;
-use super::acceptance::{no_gain, refusal};
+use super::acceptance::{is_confirmed, no_gain, refusal};
 use super::applied_noise::AppliedNoise;
 use super::exchange::MANY;
 use super::guard_models::GuardModel;
@@ -296,14 +296,18 @@ impl SearchState {
     }
 
     /// The least needed effect, if its removal is not significant. How much an effect must explain is decided by the training
-    /// records: held-out ones of another kind may show less of it, but must show it.
+    /// records: held-out ones, fewer or of another kind, may show less of it, but must show it.
     fn needless(&self, without: &[Option<ScoredModel>]) -> Option<usize> {
         let (after, excess) = (&self.after, self.excess());
         let noise = AppliedNoise::of(&self.records);
         let declared = after.fitted.structure.declared;
         let is_training = self.records.holdout.is_empty();
+        let has_no_gain = |less: &ScoredModel| match no_gain(after, less) {
+            Some(Reason::NotSignificant { .. }) if !is_training => !is_confirmed(after, less),
+            reason => reason.is_some(),
+        };
         let is_needless = |k: usize, less: &ScoredModel| {
-            no_gain(after, less).is_some()
+            has_no_gain(less)
                 || after.insignificant_of(declared + k).is_some()
                 || after.criterion() >= less.criterion()
                 || is_training && excess.is_too_small(less, after)

@@ -165,14 +165,26 @@ impl FitContext {
 pub struct EffectForm {
     pub effect: &'static Effect,
     pub form: &'static Form,
+    /// Whether no special case of it explains the records as well: then it is significant, whatever the uncertainties of its
+    /// parameters, which may be large where the records determine only a combination of several.
+    pub outdoes_special_cases: bool,
 }
 
 impl EffectForm {
+    /// An effect in one of its forms.
+    pub fn new(effect: &'static Effect, form: &'static Form) -> Self {
+        Self {
+            effect,
+            form,
+            outdoes_special_cases: false,
+        }
+    }
+
     /// All forms of some effects.
     pub fn all(effects: impl IntoIterator<Item = &'static Effect>) -> Vec<Self> {
         let forms = |effect: &'static Effect| {
             let forms = effect.forms.iter();
-            forms.map(move |form| Self { effect, form })
+            forms.map(move |form| Self::new(effect, form))
         };
         effects.into_iter().flat_map(forms).collect()
     }

@@ -172,14 +172,17 @@ impl SearchState {
         self.score_again(threads);
     }
 
-    /// Drops the weights of the records and of the models' residuals.
+    /// Drops the weights of the records and of the models' residuals. The tests remain those of the weighted residuals:
+    /// without weights, the response to the noise on the applied quantity looks like a residual that depends on the motion.
     pub(super) fn drop_weights(&mut self, threads: usize) {
         if !self.records.are_weighted() {
             return;
         }
         self.weighted = Some(self.records.clone());
         self.records.drop_weights();
+        let tests = (self.tests_before.clone(), self.tests.clone());
         self.score_again(threads);
+        (self.tests_before, self.tests) = tests;
     }
 
     /// The same with the residuals of all candidates and of the models on the way to the result.

@@ -72,10 +72,7 @@ pub(super) fn torques_unknown(
 pub(super) fn declared_effects(stand: Option<&Stand>) -> Vec<DeclaredForm> {
     let effects = stand.map_or(&[][..], |stand| &stand.effects);
     let form = |declared: &DeclaredEffect| DeclaredForm {
-        effect: EffectForm {
-            effect: declared.effect,
-            form: declared.form,
-        },
+        effect: EffectForm::new(declared.effect, declared.form),
         values: declared.values.clone(),
     };
     effects.iter().map(form).collect()

@@ -18,7 +18,7 @@ pub(super) static EFFECT: Effect = Effect {
     remedy: "Use a gage with creep matched to the beam, cure the bond again, or read at a fixed time after loading.",
     source: "K. Hoffmann, An Introduction to Measurements using Strain Gages (HBM, 1989), 3.4",
     validity: "at one temperature",
-    mistaken_for: &["thermal-drift", "capacitive-coupling"],
+    mistaken_for: &["thermal-drift", "capacitive-coupling", "structural-damping"],
     experiment: "a known load applied, held for several time constants and removed",
     forms: &[Form {
         name: "lag",
