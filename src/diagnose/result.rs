@@ -233,10 +233,7 @@ impl ErrorTable {
     fn of(found: &SearchState) -> Self {
         let (before, after) = (&found.before, &found.after);
         let units = &after.fitted.structure.context.units;
-        let size = match &after.fitted.structure.context.held {
-            Some(_) => HeldBody::acting_rms(before.compared().iter().map(|r| &r.record)),
-            None => holdout_rms(before),
-        };
+        let size = before.explainable_rms();
         let errors = |model: &ScoredModel| ModelErrors {
             rms: model.errors(),
             holdout_relative: model.compared_rms() / size,
@@ -254,17 +251,23 @@ impl ErrorTable {
     }
 }
 
-/// RMS of the held-out records about their means, without nuisance terms.
-fn holdout_rms(before: &ScoredModel) -> f64 {
-    let (mut sum, mut count) = (0.0, 0_usize);
-    for residual in before.compared().iter() {
-        let pairs = residual.modelled.iter().zip(&residual.samples);
-        let y: Vec<f64> = pairs.map(|(m, r)| m + r).collect();
-        let mean = y.iter().sum::<f64>() / y.len() as f64;
-        sum += y.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
-        count += y.len();
+impl ScoredModel {
+    /// RMS of what the model is to explain, in the compared records: the measured quantity about its means, without nuisance
+    /// terms, or what acts on a body tied to the measured motion.
+    pub(super) fn explainable_rms(&self) -> f64 {
+        if self.fitted.structure.context.held.is_some() {
+            return HeldBody::acting_rms(self.compared().iter().map(|r| &r.record));
+        }
+        let (mut sum, mut count) = (0.0, 0_usize);
+        for residual in self.compared().iter() {
+            let pairs = residual.modelled.iter().zip(&residual.samples);
+            let y: Vec<f64> = pairs.map(|(m, r)| m + r).collect();
+            let mean = y.iter().sum::<f64>() / y.len() as f64;
+            sum += y.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
+            count += y.len();
+        }
+        (sum / count as f64).sqrt()
     }
-    (sum / count as f64).sqrt()
 }
 
 impl ExcitationLevels {

@@ -50,6 +50,9 @@ const NAMED: f64 = 0.5;
 const CLEARLY_ABOVE: f64 = 1.05;
 /// Ratio of the error to the noise floor above which a remaining dependence on the input counts.
 const ABOVE: f64 = 1.005;
+/// Fraction of the records that a model leaves, above which it explains too little, whatever the noise, if the rest is
+/// correlated with the input.
+const MOST_LEFT: f64 = 0.5;
 /// Ratio of a model's error to the noise in the training records, relative to that in the hold-out records, above which
 /// something acts in the training records only.
 const MORE_IN_TRAINING: f64 = 1.4;
@@ -198,7 +201,8 @@ pub fn remains(model: &ScoredModel, tests: &ResidualTests, floor: Option<NoiseFl
     }
     let is_dependent = tests.dependence().is_some();
     let Some(floor) = floor else {
-        return is_dependent;
+        let explains_little = model.compared_rms() > MOST_LEFT * model.explainable_rms();
+        return is_dependent || explains_little && !tests.independent_of_input;
     };
     let ratio = model.compared_rms() / model.with_uncertain(floor);
     let is_enough = match floor.from {

@@ -12,6 +12,10 @@ use crate::simulate::{
     sampled_response,
 };
 
+/// Maximum number of parts of a sample in which a record is simulated: what the kinks of a signal add below the Nyquist
+/// frequency falls with its square.
+const MOST_PARTS: usize = 6;
+
 /// A record on its way through the chain, in the domain in which the last link left it.
 enum Signal {
     Spectrum(Vec<Complex64>),
@@ -103,29 +107,57 @@ impl Chain {
     /// stepped alternately, which is faster than one after the other.
     #[must_use]
     pub fn simulate_all(runs: &[StandRun<'_>], input: &Excitation) -> Vec<Vec<f64>> {
+        let parts = runs
+            .iter()
+            .map(|run| run.chain.parts_of_sample(input.substeps()));
+        let parts = parts.max().unwrap_or(1);
         let integrated = runs.iter().filter(|run| run.chain.is_integrated());
-        let mut shown = integrate_all(integrated, input).into_iter();
+        let mut shown = integrate_all(integrated, input.finer(parts)).into_iter();
         let record = |run: &StandRun| match run.chain.is_integrated() {
-            true => run
-                .chain
-                .recorded_if_finite(shown.next().unwrap_or_default(), input),
+            true => {
+                let shown = shown.next().unwrap_or_default();
+                run.chain.recorded_if_finite(shown, (input, parts))
+            }
             false => run.chain.record(run.chain.respond(input), input),
         };
         runs.iter().map(record).collect()
     }
 
+    /// Parts of a sample in which the record is simulated, of which the steps of integration are a multiple: several if
+    /// linear links follow a torque that the gage shows. Its kinks have harmonics above the Nyquist frequency, which a
+    /// delay or a filter acts on before the signal is sampled.
+    pub(crate) fn parts_of_sample(&self, substeps: usize) -> usize {
+        let is_shown = |link: &Link| link.torque().is_some_and(|(_, is_shown)| is_shown);
+        let is_after = |link: &Link| link.stage >= Stage::Gage && link.is_linear();
+        if !self.links.iter().any(is_shown) || !self.links.iter().any(is_after) {
+            return 1;
+        }
+        let mut finest_first = (1..=MOST_PARTS).rev();
+        let divides = |parts: &usize| substeps.is_multiple_of(*parts);
+        finest_first.find(divides).unwrap_or(1)
+    }
+
     /// The record for an input from the state `start`, by integration in time.
     #[must_use]
     pub fn simulate_from(&self, input: &Excitation, start: MotionState) -> Vec<f64> {
-        let mut shown = integrate_all([StandRun::of(self, start)].iter(), input);
-        self.recorded_if_finite(shown.pop().unwrap_or_default(), input)
+        let parts = self.parts_of_sample(input.substeps());
+        let mut shown = integrate_all([StandRun::of(self, start)].iter(), input.finer(parts));
+        self.recorded_if_finite(shown.pop().unwrap_or_default(), (input, parts))
     }
 
-    /// The gage signal passed through the links after the stand, up to where it diverges.
-    fn recorded_if_finite(&self, shown: Vec<f64>, input: &Excitation) -> Vec<f64> {
-        match shown.last().is_some_and(|x| x.is_finite()) {
-            true => self.recorded(shown, input),
+    /// The gage signal, at the parts of the samples, passed through the links after the stand, up to where it diverges.
+    pub(crate) fn recorded_if_finite(
+        &self,
+        shown: Vec<f64>,
+        (input, parts): (&Excitation, usize),
+    ) -> Vec<f64> {
+        let shown = match shown.last().is_some_and(|x| x.is_finite()) {
+            true => self.record(Signal::Samples(shown), input.finer(parts)),
             false => shown,
+        };
+        match parts {
+            1 => shown,
+            _ => shown.into_iter().step_by(parts).collect(),
         }
     }
 
@@ -255,11 +287,6 @@ impl Chain {
         };
         let mut shown = integrate(&mut [motion], input, range);
         shown.pop().unwrap_or_default()
-    }
-
-    /// The gage signal passed through the links after the stand.
-    pub(crate) fn recorded(&self, shown: Vec<f64>, input: &Excitation) -> Vec<f64> {
-        self.record(Signal::Samples(shown), input)
     }
 
     pub(super) fn torques(&self) -> Torques<'_> {

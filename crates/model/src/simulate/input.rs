@@ -1,6 +1,6 @@
 //! A sampled input, extended beyond its ends and interpolated between its samples.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use num_complex::Complex64;
 use torqcomp_fourier::{ComplexToReal, RealToComplex};
@@ -25,6 +25,7 @@ pub struct Excitation {
     substeps: usize,
     between: Between,
     fine: Vec<f64>,
+    finer: OnceLock<Box<Self>>,
 }
 
 impl Excitation {
@@ -69,6 +70,7 @@ impl Excitation {
             substeps,
             between: Between::BandLimited,
             fine: Vec::new(),
+            finer: OnceLock::new(),
         };
         input.refined(substeps, Between::BandLimited)
     }
@@ -90,8 +92,34 @@ impl Excitation {
             backward: self.backward.clone(),
             substeps,
             between,
+            finer: OnceLock::new(),
             ..*self
         }
+    }
+
+    /// The same input with a sample at each of this many parts of a sample, made once: the steps of integration per sample
+    /// are a multiple of it.
+    pub(crate) fn finer(&self, parts: usize) -> &Self {
+        if parts == 1 {
+            return self;
+        }
+        self.finer.get_or_init(|| {
+            let count = match self.lead {
+                0 => self.samples.len() * parts,
+                _ => (self.samples.len() - 1) * parts + 1,
+            };
+            let step = self.substeps / parts;
+            let samples = self.fine.iter().skip(1).step_by(step).take(count);
+            let samples: Vec<f64> = samples.copied().collect();
+            let finer = Self::continued(
+                samples,
+                (self.rate_hz * parts as f64, self.start_s),
+                step,
+                (self.lead * parts, self.total * parts),
+                self.periods.map(|period| Some(period? * parts)),
+            );
+            Box::new(finer.with_between(self.between))
+        })
     }
 
     /// Sets the number of integration steps per sample.

@@ -62,11 +62,13 @@ pub struct Pieces<'a> {
     cut: Option<[usize; 2]>,
     /// Initial number of steps per sample.
     steps: usize,
+    /// Parts of a sample at which the gage signal is kept.
+    parts: usize,
     /// Largest number of steps per sample needed so far.
     finest: usize,
     /// Input samples still needed.
     input: Vec<f64>,
-    /// Gage signal at the first samples of `input`.
+    /// Gage signal at the parts of the first samples of `input`.
     shown: Vec<f64>,
     /// State of the motion at the sample after them.
     progress: MotionProgress,
@@ -78,9 +80,11 @@ impl<'a> Pieces<'a> {
     /// Starts at rest.
     #[must_use]
     pub fn new(chain: &'a Chain, rate_hz: f64, between: Between) -> Self {
+        let steps = substeps(chain.stand.highest_hz(), rate_hz);
         Self {
             cut: is_local(chain, rate_hz, SIDE).then_some([PIECE, SIDE]),
-            steps: substeps(chain.stand.highest_hz(), rate_hz),
+            steps,
+            parts: chain.parts_of_sample(steps),
             progress: chain.begin(MotionState::default()),
             finest: 0,
             chain,
@@ -147,10 +151,12 @@ impl<'a> Pieces<'a> {
             last = finer;
         };
         let kept = next - side;
+        self.given = end - kept;
         self.input = input.samples()[kept..].to_vec();
+        // The last sample has no parts.
+        let [kept, next] = [kept, next].map(|k| (k * self.parts).min(shown.len()));
         self.shown = shown[kept..next].to_vec();
         self.progress = progress;
-        self.given = end - kept;
         self.steps = steps / 2;
         self.finest = steps;
         Ok(())
@@ -158,17 +164,18 @@ impl<'a> Pieces<'a> {
 
     /// The record for the input in memory, the gage signal, and the motion at the sample `next`.
     fn run(&self, input: &Excitation, next: usize) -> (Vec<f64>, Vec<f64>, MotionProgress) {
-        let mut progress = self.progress.clone();
+        let (mut progress, parts) = (self.progress.clone(), self.parts);
+        let fine = input.finer(parts);
         let mut shown = self.shown.clone();
-        let from = shown.len();
-        shown.extend(self.chain.integrated_over(input, from..next, &mut progress));
+        let count = fine.samples().len();
+        // The last sample has no parts.
+        let next = (next * parts).min(count);
+        let before = shown.len()..next;
+        shown.extend(self.chain.integrated_over(fine, before, &mut progress));
         let at_next = progress.clone();
-        let all = next..input.samples().len();
-        shown.extend(self.chain.integrated_over(input, all, &mut progress));
-        let record = match shown.last().is_some_and(|x| x.is_finite()) {
-            true => self.chain.recorded(shown.clone(), input),
-            false => shown.clone(),
-        };
+        let rest = next..count;
+        shown.extend(self.chain.integrated_over(fine, rest, &mut progress));
+        let record = self.chain.recorded_if_finite(shown.clone(), (input, parts));
         (record, shown, at_next)
     }
 }

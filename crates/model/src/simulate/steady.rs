@@ -75,18 +75,21 @@ pub fn steady_answer(
 ) -> Result<(Vec<f64>, usize), NoSteadyAnswer> {
     let mut steps = substeps(chain.stand.highest_hz(), rate_hz);
     let input = Excitation::periodic(samples, rate_hz, 0.0, steps).with_between(between);
+    let parts = chain.parts_of_sample(steps);
     let [x, speed] = chain.state_at_start(&input);
     let mut progress = chain.begin(MotionState { x, speed });
-    let mut last = settle(chain, &input, &mut progress)?;
+    let mut last = settle(chain, input.finer(parts), &mut progress)?;
     let shown = loop {
         steps *= 2;
-        let finer = settle(chain, &input.with_substeps(steps), &mut progress)?;
+        let input = input.with_substeps(steps);
+        let finer = settle(chain, input.finer(parts), &mut progress)?;
         if change(&finer, &last) <= FINE * rms(&finer) || steps >= MOST_SUBSTEPS {
             break finer;
         }
         last = finer;
     };
-    recorded(chain, &input, &shown).map(|record| (record, steps))
+    let record = recorded(chain, input.finer(parts), &shown)?;
+    Ok((record.into_iter().step_by(parts).collect(), steps))
 }
 
 /// Gage signal of the settled motion over one repetition; `progress` is the state at its end.
@@ -125,7 +128,7 @@ fn recorded(chain: &Chain, input: &Excitation, shown: &[f64]) -> Result<Vec<f64>
     let applied = input.samples().repeat(SEEN);
     let applied = Excitation::periodic(applied, input.rate_hz(), 0.0, 1);
     let applied = applied.with_between(input.between());
-    let record = chain.recorded(shown.repeat(SEEN), &applied);
+    let record = chain.recorded_if_finite(shown.repeat(SEEN), (&applied, 1));
     let (earlier, steady) = record.split_at(shown.len() * (SEEN - 1));
     let before = &earlier[earlier.len() - shown.len()..];
     match change(steady, before) <= FINE * rms(steady) {

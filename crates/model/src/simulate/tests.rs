@@ -7,6 +7,7 @@ use crate::chain::{Chain, Link};
 use crate::effects::{Action, Effect, Mode, RIVALS, Stage};
 use crate::modal::{ModalPart, ModalResponse};
 
+mod kinks;
 mod within;
 
 pub(super) const RATE_HZ: f64 = 20_000.0;
