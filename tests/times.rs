@@ -1112,3 +1112,44 @@ fn a_rate_beside_repeated_stamps_is_questioned() {
         .run(&given)
         .says(0, &["rate-keeps-repeats", said, "--resample"]);
 }
+
+/// Minutes and seconds, as a spreadsheet exports them, past one full hour or more, in memory and as a stream.
+#[test]
+fn a_clock_without_hours_goes_on_past_the_hour() {
+    let row = |i: usize| {
+        let tenths = (34_700 + i) % 36_000;
+        let (minute, tenths) = (tenths / 600, tenths % 600);
+        let volts = 0.1 * (i as f64 * 0.02).cos();
+        format!(
+            "{minute:02}:{:02}.{},{volts:.6}\n",
+            tenths / 10,
+            tenths % 10
+        )
+    };
+    let folder = Folder::new();
+    for rows in [3000, 80_000] {
+        let text: String = (0..rows).map(row).collect();
+        folder.write("in.csv", format!("Time,bridge_V\n{text}"));
+        let inspected = folder.json(&["inspect", "in.csv", "--json"]);
+        assert_eq!(
+            inspected["warnings"],
+            Value::Array(Vec::new()),
+            "{inspected}"
+        );
+        let report = folder.json(&[&COMPENSATE[..], &["--json", "--force"]].concat());
+        assert_eq!(report["samples"], rows, "{report}");
+        let text = folder.read("out.csv");
+        let last = text.lines().last().expect("a row");
+        assert!(last.starts_with(&format!("{}.9,", rows / 10 - 1)), "{last}");
+        let part = ["--range", "59:50.0..00:30.5", "--json", "--force"];
+        let report = folder.json(&[&COMPENSATE[..], &part].concat());
+        assert_eq!(report["samples"], 406, "{report}");
+    }
+    // Half an hour back is no full hour.
+    let text: String = (0..3000)
+        .map(|i| row(if i < 2000 { i + 5000 } else { i }))
+        .collect();
+    folder.write("in.csv", format!("Time,bridge_V\n{text}"));
+    let args = [&COMPENSATE[..], &["--force"]].concat();
+    folder.run(&args).says(1, &["time runs backwards"]);
+}

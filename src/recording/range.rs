@@ -10,8 +10,6 @@ use crate::io::TimeRange;
 
 /// Minimum number of seconds that is a time since 1970: 1973.
 const SINCE_1970: f64 = 1e8;
-/// Nanoseconds of a day.
-const DAY: i64 = 86_400_000_000_000;
 
 /// One end of a range.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,14 +65,16 @@ impl TimeBound {
                          record's clock shows them, without a zone",
                     )
                 })?;
-                match clock.day {
-                    Some(_) => total_ns.saturating_sub(origin.ns) as f64 * 1e-9,
-                    None => {
+                match clock.period_s() {
+                    None => total_ns.saturating_sub(origin.ns) as f64 * 1e-9,
+                    Some(period_s) => {
+                        let period = (period_s * 1e9) as i64;
                         let first_ns = origin.ns.saturating_add((start.after_s * 1e9) as i64);
-                        let after_ns = (total_ns - first_ns).rem_euclid(DAY);
+                        let after_ns = (total_ns - first_ns).rem_euclid(period);
                         // Shortly before the record rather than a day after it.
-                        let is_before = after_ns > DAY / 2;
-                        start.after_s + (after_ns - if is_before { DAY } else { 0 }) as f64 * 1e-9
+                        let is_before = after_ns > period / 2;
+                        start.after_s
+                            + (after_ns - if is_before { period } else { 0 }) as f64 * 1e-9
                     }
                 }
             }

@@ -108,7 +108,7 @@ impl StreamValidator {
             block.rows.clear();
             return Ok(());
         }
-        self.pass_midnights(block);
+        self.pass_periods(block);
         if let Some(grid) = &self.time.beside {
             self.joined.look(grid, self.last_stamp, &block.rows.times);
         }
@@ -133,18 +133,19 @@ impl StreamValidator {
         Ok(())
     }
 
-    /// Adds the days that passed before a block to its times of day.
-    fn pass_midnights(&self, block: &mut Block) {
-        let is_time_of_day = self
-            .text
-            .as_ref()
-            .is_some_and(|text| text.plan.is_time_of_day);
-        if let Some(last) = self.last_stamp.filter(|_| is_time_of_day) {
-            let days_s = super::text::days_between(last, &block.rows.times);
-            block.rows.times.iter_mut().for_each(|time| *time += days_s);
+    /// Adds the days or hours that passed before a block to the times of a clock without a date.
+    fn pass_periods(&self, block: &mut Block) {
+        let period_s = self.text.as_ref().and_then(|text| text.plan.period_s);
+        if let (Some(last), Some(period_s)) = (self.last_stamp, period_s) {
+            let passed_s = super::text::periods_between(last, &block.rows.times, period_s);
+            block
+                .rows
+                .times
+                .iter_mut()
+                .for_each(|time| *time += passed_s);
             if let Some(found) = &mut block.irregular {
-                found.before += days_s;
-                found.after += days_s;
+                found.before += passed_s;
+                found.after += passed_s;
             }
         }
     }

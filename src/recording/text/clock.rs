@@ -15,7 +15,7 @@ const SECOND: i64 = 1_000_000_000;
 const DAY: i64 = 86_400 * SECOND;
 
 /// A date, a time of day, or both.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Clock {
     /// Days since 1970-01-01.
     pub day: Option<i32>,
@@ -23,6 +23,8 @@ pub struct Clock {
     pub nanoseconds: Option<i64>,
     /// Offset of its time zone from UTC in seconds, if given.
     pub ahead_s: Option<i32>,
+    /// Whether it shows only minutes and seconds.
+    pub is_without_hours: bool,
 }
 
 /// The time that a clock showed at the origin of stamps.
@@ -80,18 +82,13 @@ impl Clock {
         if !(6..=60).contains(&text.len()) || !may_be_clock(text) {
             return None;
         }
-        if let Some((nanoseconds, ahead_s)) = time_of_day(text).or_else(|| since_start(text)) {
-            return Some(Self {
-                day: None,
-                nanoseconds: Some(nanoseconds),
-                ahead_s,
-            });
+        if let Some(clock) = time_of_day(text).or_else(|| since_start(text)) {
+            return Some(clock);
         }
         if let Some(day) = date(text) {
             return Some(Self {
                 day: Some(day),
-                nanoseconds: None,
-                ahead_s: None,
+                ..Self::default()
             });
         }
         text.char_indices()
@@ -99,11 +96,9 @@ impl Clock {
             .find_map(|(place, c)| {
                 let day = date(text[..place].trim())?;
                 let rest = text[place + c.len_utf8()..].trim();
-                let (nanoseconds, ahead_s) = time_of_day(rest)?;
                 Some(Self {
                     day: Some(day),
-                    nanoseconds: Some(nanoseconds),
-                    ahead_s,
+                    ..time_of_day(rest)?
                 })
             })
     }
@@ -122,7 +117,7 @@ impl Clock {
             nanoseconds: Some(
                 ((hours * 60 + minutes) * 60 + seconds) * SECOND + fraction(decimals)?,
             ),
-            ahead_s: None,
+            ..Self::default()
         })
     }
 
@@ -166,27 +161,48 @@ impl Clock {
         (self.total() - first.total() - i64::from(ahead_s) * SECOND) as f64 * 1e-9
     }
 
+    /// Seconds after which it starts again: a day, or an hour if it shows only minutes and seconds; `None` with a date.
+    ///
+    /// ```
+    /// use torqcomp::recording::text::Clock;
+    /// let period_s = |text| Clock::parse(text).unwrap().period_s();
+    /// assert_eq!(period_s("23:59:59.9"), Some(86_400.0));
+    /// assert_eq!(period_s("59:59.9"), Some(3600.0));
+    /// assert_eq!(period_s("2026-03-26 23:59:59.9"), None);
+    /// ```
+    pub fn period_s(self) -> Option<f64> {
+        let period_s = if self.is_without_hours {
+            3600.0
+        } else {
+            86_400.0
+        };
+        self.day.is_none().then_some(period_s)
+    }
+
     /// Nanoseconds since 1970, or since midnight without a date.
     pub(crate) fn total(self) -> i64 {
         i64::from(self.day.unwrap_or(0)) * DAY + self.nanoseconds.unwrap_or(0)
     }
 }
 
-/// Adds a day to times of day whenever they step back by more than half a day: past midnight.
-pub fn unwrap_midnights(seconds: &mut [f64]) {
+/// Adds a period, such as a day, to the times of a clock whenever they step back by more than half of it: past midnight.
+pub fn unwrap_periods(seconds: &mut [f64], period_s: f64) {
     let mut last = f64::NAN;
     for time in seconds.iter_mut().filter(|time| !time.is_nan()) {
-        *time += days_between(last, &[*time]);
+        *time += periods_between(last, &[*time], period_s);
         last = *time;
     }
 }
 
-/// Days, in seconds, between a time and the first of the times of day after it.
-pub fn days_between(last: f64, times: &[f64]) -> f64 {
-    const DAY_S: f64 = 86_400.0;
+/// Whole periods, in seconds, between a time and the first of the times after it.
+pub fn periods_between(last: f64, times: &[f64], period_s: f64) -> f64 {
     let first = times.first().copied().unwrap_or(last);
-    let days = ((last - first + 0.5 * DAY_S) / DAY_S).floor();
-    if days > 0.0 { days * DAY_S } else { 0.0 }
+    let periods = ((last - first) / period_s + 0.5).floor();
+    if periods > 0.0 {
+        periods * period_s
+    } else {
+        0.0
+    }
 }
 
 /// Whether the order of day and month, or of day and year, is ambiguous: `03/04/2025`, `25-03-14`.
@@ -215,9 +231,8 @@ fn may_be_clock(text: &str) -> bool {
         || text.rsplit_once(' ').is_some_and(|(_, last)| is_year(last))
 }
 
-/// `h:mm:ss`, with decimals after `.`, `,` or `:`, with AM or PM, with a zone; `mm:ss.f`. Also the offset of the zone
-/// from UTC in seconds.
-fn time_of_day(text: &str) -> Option<(i64, Option<i32>)> {
+/// `h:mm:ss`, with decimals after `.`, `,` or `:`, with AM or PM, with a zone; `mm:ss.f`.
+fn time_of_day(text: &str) -> Option<Clock> {
     let lower = text.to_ascii_lowercase();
     let ((body, ahead_s), half) = match lower.strip_suffix("pm").or(lower.strip_suffix("p.m.")) {
         Some(body) => ((body.trim_end(), None), Some(12)),
@@ -253,11 +268,16 @@ fn time_of_day(text: &str) -> Option<(i64, Option<i32>)> {
         return None;
     }
     let seconds = (hours * 60 + minutes) * 60 + whole;
-    Some((seconds * SECOND + fraction(decimals)?, ahead_s))
+    Some(Clock {
+        day: None,
+        nanoseconds: Some(seconds * SECOND + fraction(decimals)?),
+        ahead_s,
+        is_without_hours: rest.is_none(),
+    })
 }
 
 /// `0 days 00:00:01.5`, `-1 days +23:59:59.5` and `1 day, 0:00:01.5`, as pandas and Python write durations.
-fn since_start(text: &str) -> Option<(i64, Option<i32>)> {
+fn since_start(text: &str) -> Option<Clock> {
     let (days, rest) = text.split_once(" day")?;
     let time = rest.strip_prefix('s').unwrap_or(rest);
     let time = time.trim_start_matches([',', ' ', '+']);
@@ -265,8 +285,11 @@ fn since_start(text: &str) -> Option<(i64, Option<i32>)> {
         .parse()
         .ok()
         .filter(|days: &i64| days.abs() < 100_000)?;
-    let (nanoseconds, ahead_s) = time_of_day(time)?;
-    Some((days * DAY + nanoseconds, ahead_s))
+    let clock = time_of_day(time)?;
+    Some(Clock {
+        nanoseconds: Some(days * DAY + clock.nanoseconds?),
+        ..clock
+    })
 }
 
 /// A text without a final `Z`, `+02:00`, `-0500` or ` utc`, and the corresponding offset from UTC in

@@ -50,7 +50,7 @@ use crate::warning::Warning;
 
 pub use axis_names::is_time_name;
 pub use chunks::{Chunks, LONGEST_LINE, Piece, too_long_a_line};
-pub use clock::days_between;
+pub use clock::periods_between;
 pub use clock::{Clock, ClockOrigin};
 use decode::Decoding;
 pub use decode::refuse_binary;

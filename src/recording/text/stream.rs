@@ -5,7 +5,7 @@ use torqcomp_decimal::{Span, number};
 use super::axes::Role;
 use super::cell::{is_instruments_mark, is_non_finite, is_over_range};
 use super::chunks::Chunks;
-use super::clock::unwrap_midnights;
+use super::clock::unwrap_periods;
 use super::last_line::shortened;
 use super::rows::{ColumnKind, LineNotes, RowPlan, Rows};
 use super::table::Layout;
@@ -64,8 +64,8 @@ pub struct ChannelPlan {
     value: usize,
     /// Whether the stamps are not needed, so that unreadable ones are not a fault.
     is_watched: bool,
-    /// Whether stamps are times of day, which restart at midnight.
-    pub is_time_of_day: bool,
+    /// Seconds after which the clock of the stamps starts again, if it has no date.
+    pub period_s: Option<f64>,
     headings: Vec<String>,
 }
 
@@ -122,8 +122,8 @@ impl TextStream {
         let rows = &layout.first_rows;
         let stamps = stamps.map(|rule| {
             let mut first = rows.columns[rule.place].values.clone();
-            if plan.is_time_of_day {
-                unwrap_midnights(&mut first);
+            if let Some(period_s) = plan.period_s {
+                unwrap_periods(&mut first, period_s);
             }
             StampColumn {
                 copied: rule.seconds_per_unit == 1.0
@@ -141,7 +141,7 @@ impl TextStream {
         });
         Self {
             row_bytes: layout.first_bytes / rows.count.max(1) + 1,
-            behind_first_rows: (!is_decoded && !plan.is_time_of_day)
+            behind_first_rows: (!is_decoded && plan.period_s.is_none())
                 .then_some((layout.offset + layout.first_bytes) as u64),
             plan,
             layout,
@@ -173,8 +173,9 @@ impl ChannelPlan {
                 ..layout.plan.clone()
             },
             is_watched,
-            is_time_of_day: time.is_some_and(|place| {
-                matches!(layout.plan.kinds[place], ColumnKind::Clock(first) if first.day.is_none())
+            period_s: time.and_then(|place| match layout.plan.kinds[place] {
+                ColumnKind::Clock(first) => first.period_s(),
+                _ => None,
             }),
             time,
             value,
@@ -282,8 +283,8 @@ impl ChannelRows {
             self.lines = line;
             self.problem = Some(Problem { line, cell });
         }
-        if plan.is_time_of_day {
-            unwrap_midnights(&mut self.times);
+        if let Some(period_s) = plan.period_s {
+            unwrap_periods(&mut self.times, period_s);
         }
     }
 

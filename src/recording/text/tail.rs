@@ -107,7 +107,7 @@ impl Tail {
         let of = |((place, rule), channel): ((usize, usize), &Channel)| {
             let sums = self.columns[place].sums;
             let stamps = layout.axes.rules[rule].stamps.as_ref();
-            let stamps = stamps.filter(|rule| rule.is_of_one_cell() && !rule.is_time_of_day);
+            let stamps = stamps.filter(|rule| rule.is_of_one_cell() && rule.period_s.is_none());
             let by_stamps = stamps.and_then(|rule| {
                 let ends = &self.columns[rule.place];
                 Some((ends.last? - ends.first?) * rule.seconds_per_unit)

@@ -3,7 +3,7 @@
 use super::groups::Group;
 use super::{SAME, Sources, is_counting};
 use crate::failure::{ErrorCode, Failure};
-use crate::recording::text::clock::{Clock, ClockOrigin, unwrap_midnights};
+use crate::recording::text::clock::{Clock, ClockOrigin, unwrap_periods};
 use crate::recording::text::rows::{Column, ColumnKind};
 use crate::recording::text::units;
 use crate::recording::text::vocabulary::{has, meaning};
@@ -29,8 +29,8 @@ pub struct StampRule {
     pub origin_ns: i64,
     /// What the clock showed at the origin of its values, if they are dates or times of day.
     pub clock: Option<ClockOrigin>,
-    /// Whether they are times of day, which restart at midnight.
-    pub is_time_of_day: bool,
+    /// Seconds after which the clock starts again, if it has no date.
+    pub period_s: Option<f64>,
     /// The column with the fractional seconds of each stamp, if separate.
     pub parts: Option<FractionColumn>,
     /// Whether each value is the time since the preceding row.
@@ -62,8 +62,8 @@ impl StampRule {
             .iter()
             .map(|stamp| stamp * self.seconds_per_unit)
             .collect();
-        if self.is_time_of_day {
-            unwrap_midnights(&mut stamps);
+        if let Some(period_s) = self.period_s {
+            unwrap_periods(&mut stamps, period_s);
         }
         if let Some(rule) = self.parts {
             for (stamp, part) in stamps.iter_mut().zip(&columns[rule.place].values) {
@@ -89,7 +89,7 @@ impl StampRule {
             unit: "s",
             origin_ns: 0,
             clock: None,
-            is_time_of_day: false,
+            period_s: None,
             parts: None,
             is_sum: false,
             start_text: None,
@@ -190,7 +190,7 @@ impl Sources<'_> {
             .filter(|p| matches!(self.kinds[**p], ColumnKind::Clock(first) if first.nanoseconds.is_none()))
             .find_map(|p| self.clock_texts[*p].as_ref());
         StampRule {
-            is_time_of_day: first.day.is_none(),
+            period_s: first.period_s(),
             clock: Some(first.as_origin()),
             parts,
             start_text: Some(match date.filter(|_| first.day.is_none()) {
