@@ -39,7 +39,21 @@ pub fn read(text: &str) -> Option<NamedUnit> {
 
 /// Whether a text in place of a unit means none.
 fn says_none(text: &str) -> bool {
-    text.is_empty() || has("no units", &text.to_lowercase())
+    text.is_empty() || has("no units", &text.to_lowercase()) || is_clock_format(text)
+}
+
+/// Whether a text in place of a unit is the format of a date or a time of day: `TT.MM.JJJJ`, `hh:mm:ss.fff`, `mm:ss.0`.
+pub fn is_clock_format(text: &str) -> bool {
+    let is_mark = |c: char| matches!(c, '.' | ':' | '-' | '/' | ',' | ' ');
+    let parts = || text.split(is_mark).filter(|part| !part.is_empty());
+    let is_part = |part: &str| {
+        let part = part.to_ascii_lowercase();
+        let mut letters = part.chars();
+        let first = letters.next();
+        first.is_some_and(|first| "dtmyjahsf0".contains(first) && letters.all(|c| c == first))
+    };
+    // m/s is a unit.
+    parts().filter(|part| part.len() > 1).count() > 1 && parts().all(is_part)
 }
 
 /// A unit as written, if the cell contains one at all.
@@ -354,6 +368,23 @@ mod tests {
         ] {
             let unit = Some(unit.to_owned());
             assert_eq!(told(text), (name.to_owned(), unit, true), "{text}");
+        }
+    }
+
+    #[test]
+    fn formats_of_clocks_are_no_units() {
+        for text in [
+            "TT.MM.JJJJ",
+            "hh:mm:ss",
+            "h:mm:ss",
+            "HH:MM:SS.000",
+            "mm:ss.0",
+            "yyyy-MM-dd hh:mm:ss,fff",
+        ] {
+            assert!(is_clock_format(text), "{text}");
+        }
+        for text in ["m/s", "mm/s", "mm", "s", "h:m", "1/min", "Nm", "m.m", ""] {
+            assert!(!is_clock_format(text), "{text}");
         }
     }
 

@@ -5,6 +5,7 @@ use super::{Field, HeaderRow, after_definition};
 use crate::recording::text::cell::Cell;
 use crate::recording::text::keys::{self, Topic};
 use crate::recording::text::units;
+use crate::unit::inside_brackets;
 
 /// Whether all cells give the same key a value: `Rate: 50 Hz`, `Rate: 50 Hz`.
 pub(super) fn repeats_a_key(cells: &[String]) -> bool {
@@ -80,12 +81,19 @@ pub(super) fn is_list_of_quantities(cells: &[String]) -> bool {
             .map_or(cell, |(_, value)| value)
             .to_owned()
     };
+    // 1 (V) and 0° (mV/V) are names of channels, 1/min is a unit, and so are 0° and 90° beside a column of time.
+    let is_time = units::is_time_name(&units::heading(key).name);
+    let is_name = |value: &str, unit: &str| {
+        let bracketed = inside_brackets(unit).and_then(|(_, inside)| units::read(inside));
+        bracketed.is_some()
+            || value.starts_with("1/")
+            || is_time && units::read(unit).is_some_and(|unit| !unit.is_time())
+    };
     let is_quantity = |cell: &&&String| {
         let value = value_of(cell);
         value.starts_with(|c: char| c.is_ascii_digit() || c == '-')
             && keys::quantity(&value, b'.')
-                // 1 (V) is the name of a channel.
-                .is_some_and(|(_, unit)| !units::is_bracketed(&unit) && is_unit_or_rate(&unit))
+                .is_some_and(|(_, unit)| !is_name(&value, &unit) && is_unit_or_rate(&unit))
     };
     let is_unknown = |cell: &&&String| value_of(cell).chars().all(|c| !c.is_alphanumeric());
     let quantities = values.iter().filter(is_quantity).count();

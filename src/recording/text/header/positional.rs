@@ -256,7 +256,7 @@ pub(super) fn is_units(cells: &[String]) -> bool {
     let filled: Vec<&String> = cells.iter().filter(|cell| !cell.is_empty()).collect();
     let known = filled
         .iter()
-        .filter(|cell| units::read(cell).is_some())
+        .filter(|cell| units::read(cell).is_some() || units::is_clock_format(cell))
         .count();
     let bracketed = filled
         .iter()
