@@ -212,7 +212,7 @@ fn a_run_in_one_direction_does_not_invent_a_dry_friction() {
     }
 }
 
-/// An absolute encoder that begins again after each turn, or after each quarter or two turns.
+/// An absolute encoder that begins again after each turn or two.
 #[test]
 fn an_angle_that_wraps_is_continued() {
     let (angles, torques) = record(40.0, &mut Noise(41));
@@ -231,8 +231,32 @@ fn an_angle_that_wraps_is_continued() {
         assert!(found.method.iter().any(|line| line.contains("wraps")));
         assert!(found.warnings.iter().all(|w| w.code != "poor-fit"));
     }
-    let refused = found(0.4 * TAU).unwrap_err().to_string();
+    // A single jump of another size is asked about.
+    let jumped = |(i, angle): (usize, &f64)| if i > 2000 { angle - 20.0 } else { *angle };
+    let jumped: Vec<f64> = angles.iter().enumerate().map(jumped).collect();
+    let refused = runup::identify(&turning(&jumped, &torques), &options);
+    let refused = refused.unwrap_err().to_string();
     assert!(refused.contains("wraps and cannot be made"), "{refused}");
+}
+
+/// A counter that begins again after 8.192 turns, half a turn, or 10 rad; its speed is ten turns per second.
+#[test]
+fn an_angle_that_wraps_at_any_constant_span_is_continued() {
+    let (angles, torques) = record(40.0, &mut Noise(41));
+    let turned = |(i, angle): (usize, &f64)| angle + 10.0 * TAU * i as f64 / 1000.0;
+    let turned: Vec<f64> = angles.iter().enumerate().map(turned).collect();
+    let options = runup::RunupOptions::default();
+    let inertia = |angles: &[f64]| {
+        let found = runup::identify(&turning(angles, &torques), &options).unwrap();
+        (of(&found, "inertia").value(), found)
+    };
+    let (whole, _) = inertia(&turned);
+    for span in [8.192 * TAU, 0.5 * TAU, 10.0] {
+        let wrapped: Vec<f64> = turned.iter().map(|angle| angle.rem_euclid(span)).collect();
+        let (own, found) = inertia(&wrapped);
+        assert!((own / whole - 1.0).abs() < 1e-4, "{span}: {own} {whole}");
+        assert!(found.method.iter().any(|line| line.contains("wraps")));
+    }
 }
 
 /// 8 s of an arm with viscous friction and a torque of gravity, by small steps: angle, speed and torque at 500 Hz.

@@ -165,7 +165,7 @@ pub fn identify(run: &FreeRun, options: &RunupOptions) -> Result<Identification,
         unit: run.body.effort().to_owned(),
         relative: left / rms(&fitted.moving(&fitted.rows.right)),
     });
-    result.method.extend(wrapped::method(wraps));
+    result.method.extend(wraps);
     result.method.extend(gravity::method(run, terms));
     present::method(&mut result, run, &directions, &fitted);
     present::draw(&mut result, run, &fitted);
