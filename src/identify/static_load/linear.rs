@@ -24,8 +24,8 @@ const LEAST: usize = 3;
 
 /// Ratio of the error with two ranges to that with one, up to which there are two, and minimum change of the
 /// sensitivity between them.
-const TWO_RANGES: f64 = 0.1;
-const LEAST_CHANGE: f64 = 0.02;
+pub(super) const TWO_RANGES: f64 = 0.1;
+pub(super) const LEAST_CHANGE: f64 = 0.02;
 /// Minimum number of loads in a range.
 const FEWEST: usize = 2;
 

@@ -9,6 +9,7 @@ mod plateaus;
 mod ramp;
 mod repeated;
 mod rows;
+mod series_slopes;
 mod settling;
 mod solve;
 mod steady;
@@ -182,6 +183,7 @@ pub fn identify(
     let largest = steps.largest;
     groups::refuse_mixed(points)?;
     linear::refuse_two_ranges(points, &steps)?;
+    series_slopes::refuse(points, largest, units)?;
     let mut fit = mixed::fit(points, degree, &steps)?;
     let shared = settled.as_ref().map(|s| s.widen(&mut fit.std, largest));
     if let Some(ramp) = &ramp {
