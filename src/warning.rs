@@ -86,6 +86,7 @@ codes! {
         ScaleInHeading = "scale-in-heading": "the heading of the channel contains a scale factor such as x10, or a line above whole numbers gives one; it was not applied", "scale the column and rename it, or remove the line";
         CalibrationNotUsed = "calibration-not-used": "a record in strain was converted with the beam's dimensions although a calibration is given", "record in the unit of the calibration";
         DampingAboveOne = "damping-above-one": "the damping ratio is above 1", "write 7 % as 0.07";
+        MeganewtonMetres = "meganewton-metres": "a torque is in MN m, which is easily written for mN m", "give --unit \"mN m\", or confirm MN m";
         VoltsUnusual = "volts-unusual": "most of a record in V exceeds 30 V, more than any bridge amplifier outputs", "give --unit mV if it is in mV";
         ZeroFarFromRecord = "zero-far-from-record": "the given zero is more than 10 times as large as any sample of the record", "check the zero and its unit";
         ZeroNotUsed = "zero-not-used": "the zero is given in a different quantity from the record, and was not subtracted", "give it in the unit of the record";

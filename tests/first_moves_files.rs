@@ -65,6 +65,85 @@ fn units_behind_an_underscore_are_read() {
     }
 }
 
+/// The two outputs of a carrier-frequency amplifier, which are named by their angle.
+#[test]
+fn a_channel_named_by_its_angle_is_read() {
+    let folder = Folder::new();
+    for head in [
+        "Time (s),0° (mV/V)",
+        "Time (s),0 deg (mV/V)",
+        "Zeit,0°\ns,mV/V",
+    ] {
+        let channel = channel_of(
+            &folder,
+            &file(head, |row| format!("{}", row as f64 / 1000.0)),
+        );
+        assert!(
+            channel["name"].as_str().is_some_and(|n| n.starts_with('0')),
+            "{channel}"
+        );
+        assert_eq!(channel["unit"], "mV/V", "{head}");
+    }
+}
+
+/// Units below the names of some columns, or beside the formats of date and time.
+#[test]
+fn units_beside_a_clock_are_read() {
+    let folder = Folder::new();
+    for units in [
+        ",,V,1/min",
+        ",,1/min,V",
+        "TT.MM.JJJJ,hh:mm:ss,V,1/min",
+        "yyyy-MM-dd,HH:mm:ss.fff,V,1/min",
+        "s,,V,1/min",
+    ] {
+        let clock = |row: usize| {
+            format!(
+                "2024-02-01,10:00:{:06.3},{}",
+                row as f64 / 100.0,
+                torque(row)
+            )
+        };
+        let rows = (0..3000).map(|row| format!("{},{}\n", clock(row), 1000 + row));
+        let head = format!("Datum,Zeit,Spannung,Drehzahl\n{units}\n");
+        folder.write("in.csv", format!("{head}{}", rows.collect::<String>()));
+        let report = folder.json(&["inspect", "in.csv", "--json"]);
+        let said = |place: usize, key: &str| report["channels"][place][key].clone();
+        let found = [said(0, "name"), said(0, "unit"), said(1, "unit")];
+        let want = match units.ends_with('V') {
+            true => ["Spannung", "1/min", "V"],
+            false => ["Spannung", "V", "1/min"],
+        };
+        assert_eq!(found, want.map(Value::from), "{units}");
+    }
+}
+
+/// Torques in MN m are read as such, with a remark that names both readings.
+#[test]
+fn meganewton_metres_are_questioned() {
+    let folder = Folder::new();
+    folder.write("stand.toml", STAND);
+    for (heading, answer, is_said) in [
+        ("M [MNm]", None, true),
+        ("T [MN m]", None, true),
+        ("M [MNm]", Some("mN m"), false),
+        ("M [MNm]", Some("MN m"), false),
+        ("M [mNm]", None, false),
+    ] {
+        let head = format!("time_s,{heading}");
+        folder.write(
+            "in.csv",
+            file(&head, |row| format!("{}", row as f64 / 1000.0)),
+        );
+        let answer = answer.map_or(Vec::new(), |unit| vec!["--unit", unit]);
+        let run = folder.run(&[&COMPENSATE[..], &["--force"], &answer].concat());
+        run.says(0, &[]);
+        let said = run.stderr.contains("[meganewton-metres]") && run.stderr.contains("0.001 N m");
+        assert_eq!(said, is_said, "{heading} {answer:?}: {}", run.stderr);
+        assert!(!run.stderr.contains("unit-overrides"), "{}", run.stderr);
+    }
+}
+
 #[test]
 fn stamps_of_ros_are_exact_in_one_column_and_in_two() {
     let folder = Folder::new();

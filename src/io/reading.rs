@@ -62,6 +62,9 @@ pub struct Reading {
     /// Whether stamps may be irregular, because they are only handed on.
     #[arg(skip)]
     pub any_steps: bool,
+    /// Whether rows are no samples in time, so that a column with few values is no slower channel.
+    #[arg(skip)]
+    pub keeps_rows: bool,
 }
 
 /// The ends of a time range as written; their meaning depends on the record's time axis.

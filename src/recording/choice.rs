@@ -1,10 +1,8 @@
 //! Selection of one channel of a recording, the same for every format and command.
 
-use std::collections::BTreeSet;
-
 use torqcomp_decimal::digits;
 use torqcomp_dsp::quality::rate::{Contradiction, contradiction};
-use torqcomp_model::Unit;
+use torqcomp_model::{Dimension, Unit};
 
 use super::axis::step_of;
 use super::moment::Moment;
@@ -12,7 +10,7 @@ use super::shared_stamps::refuse_shared_stamps;
 use super::stamps::TOLERABLE;
 use super::text::is_of_skipped_column;
 use super::uneven::{advice_for_uneven, without_rate};
-use super::{Channel, Hole, HoleKind, RateFrom, Recording, check_holes, check_size, formats};
+use super::{Channel, RateFrom, Recording, formats};
 use crate::failure::{ErrorCode, Failure, did_you_mean};
 use crate::io::{ChannelChoice, Reading, already_compensated};
 use crate::print::{enumeration, list, plural, some_of};
@@ -173,10 +171,12 @@ pub(crate) fn unit_of(
     of_file: Option<&NamedUnit>,
 ) -> Result<(Option<NamedUnit>, Option<Warning>), Failure> {
     let (Some(text), Some(flag)) = (&choice.unit, choice.flags.unit) else {
-        return Ok((of_file.cloned(), None));
+        let read = of_file.zip(choice.flags.unit);
+        let slip = read.and_then(|(named, flag)| meganewton_metres(heading, named, flag));
+        return Ok((of_file.cloned(), slip));
     };
     let given = NamedUnit::given(flag, text)?;
-    // Answering whether a pound is a force does not override the unit.
+    // Answering whether a pound is a force, or an M a milli, does not override the unit.
     let answers = |named: &NamedUnit| {
         let readings = Unit::readings_of_weight(&named.text).into_iter().flatten();
         let mut units = readings.filter_map(|text| Unit::parse(&text).ok());
@@ -185,7 +185,9 @@ pub(crate) fn unit_of(
                 && (unit.factor() / given.unit.factor() - 1.0).abs() < 1e-12
         })
     };
-    let other = of_file.filter(|named| named.unit != given.unit && !answers(named));
+    let is_slip = |named: &NamedUnit| meganewton_metres(heading, named, flag).is_some();
+    let other = of_file.filter(|named| named.unit != given.unit);
+    let other = other.filter(|named| !answers(named) && !is_slip(named));
     let warning = other.map(|named| {
         WarningCode::UnitOverridesHeading.warning(format!(
             "\"{heading}\" says {}, {flag} says {text}; {text} was used",
@@ -193,6 +195,18 @@ pub(crate) fn unit_of(
         ))
     });
     Ok((Some(given), warning))
+}
+
+/// A warning about meganewton metres, which few stands have and which are easily written for mN m.
+fn meganewton_metres(heading: &str, named: &NamedUnit, flag: &str) -> Option<Warning> {
+    let is_it = named.unit.dimension() == Dimension::TORQUE && named.unit.factor() == 1e6;
+    is_it.then(|| {
+        WarningCode::MeganewtonMetres.warning(format!(
+            "\"{heading}\" is in {}, meganewton metres (1 MN m = 1000000 N m), and was read as such; for millinewton metres \
+             (0.001 N m) give {flag} \"mN m\", otherwise confirm it with {flag} \"MN m\"",
+            named.text
+        ))
+    })
 }
 
 /// A warning if a given rate contradicts the stamps.
@@ -315,52 +329,6 @@ impl Recording {
             unit,
             warnings,
         })
-    }
-
-    /// A channel used without a time axis, with its unit and warnings.
-    ///
-    /// # Errors
-    /// If it is missing, has holes or is too large.
-    pub(crate) fn column(
-        &self,
-        choice: &ChannelChoice,
-    ) -> Result<(&Channel, Option<NamedUnit>, Option<Warning>), Failure> {
-        let channel = self.channel(choice)?;
-        check_holes(channel)?;
-        check_size(channel)?;
-        let (unit, warning) = unit_of(choice, &channel.heading, channel.unit.as_ref())?;
-        Ok((channel, unit, warning))
-    }
-
-    /// The same without rows that are blank in all channels, such as lines between the series of a table.
-    pub(crate) fn without_blank_rows(mut self) -> Self {
-        let is_blank = |hole: &Hole| matches!(hole.what, HoleKind::Empty | HoleKind::Missing);
-        let blanks = |channel: &Channel| -> BTreeSet<usize> {
-            let holes = channel.holes.iter().filter(|hole| is_blank(hole));
-            holes.map(|hole| hole.index).collect()
-        };
-        let count = |channel: &Channel| channel.samples.len();
-        if self
-            .channels
-            .windows(2)
-            .any(|pair| count(&pair[0]) != count(&pair[1]))
-        {
-            return self;
-        }
-        let common = self.channels.iter().map(blanks);
-        let common = common.reduce(|a, b| a.intersection(&b).copied().collect());
-        let common = common.unwrap_or_default();
-        for channel in &mut self.channels {
-            let mut place = 0..;
-            channel
-                .samples
-                .retain(|_| place.next().is_some_and(|k| !common.contains(&k)));
-            channel.holes.retain(|hole| !common.contains(&hole.index));
-            for hole in &mut channel.holes {
-                hole.index -= common.range(..hole.index).count();
-            }
-        }
-        self
     }
 
     /// The selected channel, whatever its rate.

@@ -14,6 +14,7 @@ mod fill;
 mod first_samples;
 pub(crate) mod formats;
 mod joined;
+mod loads;
 mod memory_stream;
 mod message_stream;
 mod messages;

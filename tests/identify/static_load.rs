@@ -918,3 +918,77 @@ fn constant_readings_are_steady() {
     let codes: Vec<&str> = found.warnings.iter().map(|w| w.code).collect();
     assert!(!codes.contains(&"unsettled-left-out"), "{codes:?}");
 }
+
+/// A load that is written in the first row of its step only, at equal or other distances, with a column of time or not.
+#[test]
+fn a_load_written_once_for_each_step_is_held() {
+    let folder = Folder::new();
+    let command = "identify static in.csv --load load --reading bridge";
+    let command: Vec<&str> = command.split(' ').collect();
+    for (uneven, is_timed) in [(0, false), (0, true), (1, false), (1, true)] {
+        let mut text = if is_timed { "time_s," } else { "" }.to_owned() + "load_Nm,bridge_V\n";
+        let mut row = 0;
+        for (step, load) in [0, 5, 10, 15, 20, 10, 0].into_iter().enumerate() {
+            for k in 0..5 + uneven * (step % 3) {
+                let written = if k == 0 {
+                    load.to_string()
+                } else {
+                    String::new()
+                };
+                let time = if is_timed {
+                    format!("{row},")
+                } else {
+                    String::new()
+                };
+                let noise = 1e-4 * f64::from(row * 7 % 5 - 2);
+                let reading = 0.1 + 0.05 * f64::from(load) + noise;
+                text += &format!("{time}{written},{reading:.4}\n");
+                row += 1;
+            }
+        }
+        folder.write("in.csv", &text);
+        let rows = format!(
+            "\"load\" is empty in {} of {row} rows, first in line 3",
+            row - 7
+        );
+        folder.run(&command).says(1, &[&rows, "--fill hold"]);
+        let report = folder.json(&[&command[..], &["--fill", "hold", "--json"]].concat());
+        assert_eq!(report["samples"], row);
+        let (value, std, _) = parameter(&report, "torque_per_volt");
+        assert!((value - 20.0).abs() < 3.0 * std.unwrap() + 1e-9, "{value}");
+        assert!(report.to_string().contains("filled"), "{report}");
+    }
+    folder.write("in.csv", "load_Nm,bridge_V\n0,0\n5,1\n10,\n5,1\n0,\n");
+    folder
+        .run(&command)
+        .says(1, &["\"bridge\" ends after 4 rows"]);
+}
+
+/// The gain of the amplifier was changed between two series.
+#[test]
+fn series_of_different_gain_are_refused_with_both() {
+    let folder = Folder::new();
+    let series = |gain: f64, zero: f64| {
+        let row = |(k, load): (i32, &i32)| {
+            let noise = 1e-4 * f64::from(k * 7 % 5 - 2);
+            format!("{load},{:.4}\n", zero + gain * f64::from(*load) + noise)
+        };
+        let loads = [0, 5, 10, 15, 20, 15, 10, 5, 0];
+        (0..).zip(&loads).map(row).collect::<String>()
+    };
+    let run = |rows: &[String]| {
+        folder.write("in.csv", format!("load_Nm,bridge_V\n{}", rows.concat()));
+        let command = "identify static in.csv --load load --reading bridge";
+        folder.run(&command.split(' ').collect::<Vec<_>>())
+    };
+    let first = series(0.05, 0.1);
+    run(&[first.clone(), series(0.1, 0.1)]).says(
+        1,
+        &["0.04999 V/(N m) in series 1", "0.09999 V/(N m) in series 2"],
+    );
+    let third = series(0.1, 0.2);
+    run(&[first.clone(), first.clone(), third])
+        .says(1, &["changes from one series to another", "in series 3"]);
+    run(&[first.clone(), series(0.0502, 0.1)]).says(0, &[]);
+    run(&[first.clone(), first]).says(0, &[]);
+}

@@ -24,22 +24,18 @@ fn pair(args: &Diagnose, file: &Path) -> Result<Pair, Failure> {
     let choices = two_columns(args, needs)?;
     // The times of the loads do not matter, so no time axis is searched for, whatever options the records have.
     let reading = Reading {
-        rate_hz: Some(1.0),
+        rate_hz: None,
         time_column: None,
         time_unit: None,
         resample: false,
         range: None,
         ..args.reading.clone()
     };
-    let recording = Recording::read(&Input::of(file), &choices, &reading)?;
     let [load, gage] = &choices;
+    let columns = [load, gage].map(std::slice::from_ref);
+    let recording = Recording::of_loads(&Input::of(file), columns, &reading)?;
     let (load, applied_unit, of_load) = recording.column(load)?;
     let (gage, measured_unit, of_gage) = recording.column(gage)?;
-    if load.samples.len() != gage.samples.len() {
-        return Err(ErrorCode::RecordsDiffer
-            .failed("the columns differ in length; each load needs a reading")
-            .at(&recording.source));
-    }
     Ok(Pair {
         source: recording.source.clone(),
         applied: Some(load.samples.clone()),

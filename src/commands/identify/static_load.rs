@@ -12,7 +12,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::file_name::ShowPath;
 use crate::identify::Identification;
 use crate::identify::static_load::{CalibrationStep, LoadUnits, Point, identify, series_of};
-use crate::io::{ChannelChoice, Flags, Input, Reading};
+use crate::io::{ChannelChoice, Flags, Input};
 use crate::recording::{Recording, unit_of};
 use crate::stand::update::Entry;
 use crate::stand::{AT_TORQUE, TransducerSignal};
@@ -28,14 +28,10 @@ pub fn run(args: &Static) -> Result<Outcome, Failure> {
         return Err(ErrorCode::ConflictingArguments
             .usage("--resample does not apply: a table of loads has no time axis"));
     }
-    // A table of loads has no time axis; a given rate prevents the search for one.
-    let reading = Reading {
-        rate_hz: args.table.rate_hz.or(Some(1.0)),
-        ..args.table.clone()
-    };
     let columns = LoadColumns::of(args);
-    let recording = Recording::read(&Input::of(&args.input), &columns.all(), &reading)?;
-    let recording = recording.without_blank_rows();
+    let [set, read] = columns.set_and_read();
+    let input = Input::of(&args.input);
+    let recording = Recording::of_loads(&input, [&set, &read], &args.table)?;
     let mut recorded = Recorded::default();
     let (points, units) = points(args, &columns, &recording, &mut recorded.warnings)?;
     let result = identify(&points, args.degree, &units)?;
@@ -86,13 +82,16 @@ impl LoadColumns {
         }
     }
 
-    fn all(&self) -> Vec<ChannelChoice> {
-        let further = [&self.series, &self.position, &self.std];
-        [&self.load, &self.reading]
-            .into_iter()
-            .chain(further.into_iter().flatten())
-            .cloned()
-            .collect()
+    /// What is set for each step, and what is read in each row.
+    fn set_and_read(&self) -> [Vec<ChannelChoice>; 2] {
+        let all = |first: &ChannelChoice, further: &[&Option<ChannelChoice>]| {
+            let further = further.iter().copied().flatten();
+            std::iter::once(first).chain(further).cloned().collect()
+        };
+        [
+            all(&self.load, &[&self.series, &self.position]),
+            all(&self.reading, &[&self.std]),
+        ]
     }
 }
 
@@ -124,21 +123,6 @@ fn points(
         None => series,
     };
     let stds = stds(args, columns, recording, (&unit, factor))?;
-    let counts = [
-        Some(readings.len()),
-        positions.as_ref().map(Vec::len),
-        stds.as_ref().map(Vec::len),
-        Some(series.len()),
-    ];
-    if counts
-        .into_iter()
-        .flatten()
-        .any(|count| count != loads.len())
-    {
-        return Err(ErrorCode::RecordsDiffer
-            .failed("the columns differ in length; each load needs a reading")
-            .at(args.input.shown()));
-    }
     let point = |i: usize| Point {
         load: loads[i],
         reading: readings[i] * factor,

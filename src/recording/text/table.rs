@@ -65,6 +65,8 @@ pub struct Layout {
     pub block_rows: Option<usize>,
     /// Why it cannot be read row by row, if so.
     pub held_whole: Option<&'static str>,
+    /// Whether columns with few values keep their empty cells.
+    keeps_rows: bool,
 }
 
 /// A table after reading.
@@ -150,6 +152,7 @@ impl Layout {
             zeros_above: 0,
             block_rows: None,
             held_whole: None,
+            keeps_rows: reading.keeps_rows,
             header,
             plan,
         };
@@ -363,7 +366,12 @@ impl Layout {
                 true => rows.columns[place].clone(),
                 false => std::mem::take(&mut rows.columns[place]),
             };
-            channels.push(channel(&self.header.fields[place], column, axis));
+            let made = if self.keeps_rows {
+                with_all_rows
+            } else {
+                channel
+            };
+            channels.push(made(&self.header.fields[place], column, axis));
         }
         channels
     }
@@ -409,9 +417,14 @@ impl ReadTable {
     }
 }
 
-/// A channel from a column.
+/// A channel from a column, without the empty cells if it is slower than the rows.
 pub fn channel(field: &Field, mut column: Column, mut axis: TimeAxis) -> Channel {
     sparse::thin(&mut column, &mut axis);
+    with_all_rows(field, column, axis)
+}
+
+/// A channel from all cells of a column.
+fn with_all_rows(field: &Field, column: Column, mut axis: TimeAxis) -> Channel {
     if let Some(stamps) = &axis.stamps_s
         && stamps.len() > column.values.len()
     {
