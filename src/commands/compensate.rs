@@ -201,7 +201,7 @@ impl Plan {
             quantity: chain.applied.name,
             rated_torque: chain.rated_n_m.map(|rated| rated / chain.applied.factor),
             levels: chain.levels(),
-            modes: warnings::modes(&self.stand),
+            modes: self.stand.resonances(),
             rate_hz: stream.rate_hz,
             rate_std_hz: stream.channel.axis.rate_std_hz,
             filled: stream.channel.filled.clone(),
@@ -257,9 +257,8 @@ impl Plan {
             }
         };
         let top_hz = self.filter.band().top_hz();
-        let resonances = warnings::modes(&self.stand)
-            .into_iter()
-            .map(|(natural_hz, _)| natural_hz);
+        let resonances = self.stand.resonances().into_iter();
+        let resonances = resonances.map(|(natural_hz, _)| natural_hz);
         let fine = (1..=UNCERTAIN_POINTS).map(|k| top_hz * k as f64 / UNCERTAIN_POINTS as f64);
         let everywhere = fine.chain(resonances).filter(|hz| *hz <= top_hz);
         let largest_std = everywhere

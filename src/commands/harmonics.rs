@@ -33,7 +33,7 @@ use crate::failure::{ErrorCode, Failure};
 use crate::io::{COMPENSATED, Input};
 use crate::outcome::{Made, RecordFigures};
 use crate::print::{Report, enumeration, short};
-use crate::quality::excerpt;
+use crate::quality::{excerpt, resonance};
 use crate::recording::moment::Moment;
 use crate::recording::{ChannelStream, Spool, UniformRecord};
 use crate::stand::{self, Calibration, ConstantStd, Stand, TorqueStd, off_rated};
@@ -289,7 +289,7 @@ fn fit(
         (&found, &components),
     ));
     warnings.extend(mains::warning(&components, duration_s));
-    warnings.extend(of_quality(record, &seen, channel, chain)?);
+    warnings.extend(of_quality(record, &seen, channel, way)?);
     Ok(HarmonicsReport {
         input: source.to_owned(),
         channel: channel.to_owned(),
@@ -321,8 +321,9 @@ fn of_quality(
     record: &UniformRecord,
     seen: &[f64],
     channel: &str,
-    chain: &Calibration,
+    way: &WayBack,
 ) -> Result<Vec<Warning>, Failure> {
+    let chain = &way.chain;
     let count = record.samples.count();
     let mut faults = StreamedFaults::default();
     record
@@ -340,6 +341,11 @@ fn of_quality(
     let levels = chain.levels().warnings(seen, of.scale, of.unit);
     let mut found = excerpt::warnings(seen, of);
     found.extend(levels);
+    if let Some((stand, _)) = &way.stand {
+        let first = &seen[..seen.len().min(excerpt::OF_STREAM)];
+        let modes = stand.resonances();
+        found.extend(resonance::warning(first, record.rate_hz, &modes));
+    }
     Ok(found)
 }
 

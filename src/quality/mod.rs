@@ -5,6 +5,7 @@
 
 pub mod copies;
 pub mod excerpt;
+pub(crate) mod resonance;
 pub mod samples;
 pub mod time;
 

@@ -255,9 +255,10 @@ pub(super) fn spiked(name: &str, unit: &str, found: &Spikes, axis: &TimeAxis) ->
 
 fn two_signals(name: &str, unit: &str, difference: f64) -> Warning {
     WarningCode::TwoSignals.warning(format!(
-        "\"{name}\": every other sample belongs to another signal, {} apart on average: two sources are mixed, as two \
-         nodes that publish on one topic; record each under a name of its own",
-        with_unit(difference.abs(), unit, 3)
+        "\"{name}\": every other sample belongs to another signal, {} apart (rms): two sources are mixed row by row, as \
+         two sensors of one logger, or two nodes that publish on one topic; give each a column or topic of its own, or \
+         every second row (if it is one signal, it has a line near half the sampling rate)",
+        with_unit(difference, unit, 3)
     ))
 }
 

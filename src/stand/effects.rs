@@ -161,6 +161,16 @@ impl Stand {
         Ok(self.mechanics()?.response.modal())
     }
 
+    /// Natural frequency in Hz and damping ratio of each mode; empty without mechanics.
+    pub fn resonances(&self) -> Vec<(f64, f64)> {
+        let modes = self.modes().ok();
+        let parts = modes.iter().flat_map(|modes| modes.parts());
+        let modes = parts.map(|part| part.mode);
+        modes
+            .map(|mode| (mode.natural_frequency_hz(), mode.damping_ratio))
+            .collect()
+    }
+
     /// Static gain, recorded per applied quantity, in SI units; 1 for a stand that records torque.
     pub fn gain(&self) -> f64 {
         self.static_gain().map_or(1.0, |gain| gain.value)

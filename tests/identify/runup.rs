@@ -3,7 +3,7 @@
 use torqcomp::identify::{Motion, runup};
 
 use super::{Coverage, Noise, TAU, of};
-use crate::util::assert_close;
+use crate::util::{Folder, assert_close, codes};
 
 /// A body with viscous and dry friction: `J v' + f v + F sgn v + C = T`.
 struct Body {
@@ -309,5 +309,81 @@ fn gravity_on_an_arm_does_not_bias_its_inertia() {
                 within("gravity_cosine", gravity[1], 0.02);
             }
         }
+    }
+}
+
+/// A reaction torque that rings at 180 Hz with a damping ratio of 0.015 after each change, beside a stand file.
+#[test]
+fn a_run_up_that_rings_elsewhere_than_the_stand_file_says_is_questioned() {
+    let folder = Folder::new();
+    let (rate, omega) = (5000.0, TAU * 180.0);
+    let mut noise = Noise(17);
+    let mut speed = 0.0;
+    let mut angle = 0.0;
+    let mut text = "time_s,angle_rad,torque_Nm\n".to_owned();
+    for i in 0..20_000 {
+        let t = f64::from(i) / rate;
+        let since = t % 1.0;
+        let level: f64 = if t % 2.0 < 1.0 { 1.0 } else { -0.9 };
+        let change = if t < 1.0 { 1.0 } else { 1.9 * level.signum() };
+        let rings = change * (-0.015 * omega * since).exp() * (omega * since).cos();
+        text += &format!(
+            "{t:.5},{angle:.7},{:.6}\n",
+            level - rings + 2e-3 * noise.normal()
+        );
+        speed += (level - 0.01 * speed) / 0.01 / rate;
+        angle += speed / rate;
+    }
+    folder.write("in.csv", text);
+    let command = "identify runup in.csv --motion angle --torque torque --stand stand.toml --json";
+    for (frequency, ratio, code) in [
+        (170, 0.015, Some("resonance-elsewhere")),
+        (180, 0.1, Some("damping-differs")),
+        (180, 0.015, None),
+    ] {
+        let mechanics =
+            format!("natural_frequency = \"{frequency} Hz\"\ndamping_ratio = {ratio}\n");
+        let stand = format!("schema = \"torqcomp.stand/1\"\n[mechanics]\n{mechanics}");
+        folder.write("stand.toml", stand);
+        let report = folder.json(&command.split(' ').collect::<Vec<_>>());
+        let said = ["resonance-elsewhere", "damping-differs"].into_iter();
+        let mut said = said.filter(|code| codes(&report).contains(code));
+        assert_eq!(said.next(), code, "{report}");
+    }
+}
+
+/// Units of a speed that can be read in two ways are asked about.
+#[test]
+fn units_of_speeds_are_read_or_asked() {
+    let folder = Folder::new();
+    let per_turn = TAU / 60.0;
+    for (heading, size, says) in [
+        ("n [krpm]", 1e3 * per_turn, None),
+        ("n_krpm", 1e3 * per_turn, None),
+        ("n [gon/s]", TAU / 400.0, None),
+        ("n [rpm x1000]", 1e3 * per_turn, Some("krpm")),
+        ("n [1/s]", TAU, Some("rev/s")),
+    ] {
+        let row = |i: i32| {
+            let t = f64::from(i) / 1000.0;
+            let up = if t < 2.0 { 1.0 } else { -1.0 };
+            let speed = if t < 2.0 { 10.0 * t } else { 40.0 - 10.0 * t };
+            format!(
+                "{t:.4},{:.9},{}\n",
+                speed / size,
+                0.1 * up + 1e-3 * (1.7 * f64::from(i)).sin()
+            )
+        };
+        let rows: String = (0..4000).map(row).collect();
+        folder.write("in.csv", format!("time_s,{heading},torque_Nm\n{rows}"));
+        let command = "identify runup in.csv --motion n --torque torque --json";
+        let command: Vec<&str> = command.split(' ').collect();
+        if let Some(says) = says {
+            folder.run(&command).says(1, &[says]);
+            continue;
+        }
+        let report = folder.json(&command);
+        let (inertia, _, _) = super::parameter(&report, "inertia");
+        assert_close(inertia, 0.01, 1e-3);
     }
 }

@@ -1,11 +1,6 @@
 //! Warnings about a compensated record.
 
-use std::cell::LazyCell;
-
 use torqcomp_dsp::noise::RecordNoise;
-use torqcomp_dsp::peaks::without_steady;
-use torqcomp_dsp::quality::resonance::{dominant_resonance, other_damping, other_resonance};
-use torqcomp_dsp::quality::ringing::ringing_elsewhere;
 use torqcomp_model::Mode;
 
 use super::Seen;
@@ -13,7 +8,7 @@ use super::plot::Traces;
 use super::report::CompensateReport;
 use crate::inverse::ChainInverse;
 use crate::print::{rounded, short};
-use crate::quality::excerpt;
+use crate::quality::{excerpt, resonance};
 use crate::stand::{Stand, off_rated};
 use crate::warning::{Warning, WarningCode};
 
@@ -40,10 +35,11 @@ pub(super) fn add(report: &mut CompensateReport, seen: &Seen, traces: Option<&Tr
     );
     report.looked_at = seen.excerpt.len();
     more.extend(of_quality(report, seen));
-    // The orders of a machine hide what rings between its steps.
-    let steady = LazyCell::new(|| without_steady(&seen.excerpt, report.rate_hz));
-    let rest = || steady.as_deref();
-    more.extend(of_resonance(report, seen, &rest).or_else(|| of_damping(report, seen, &rest)));
+    more.extend(resonance::warning(
+        &seen.excerpt,
+        report.rate_hz,
+        &report.modes,
+    ));
     let levels = &report.levels;
     more.extend(levels.warnings(&seen.excerpt, report.scale, &report.unit));
     let peak = report.result.peak();
@@ -96,84 +92,6 @@ pub(super) fn of_mean(undo: Option<&ChainInverse>) -> Option<Warning> {
         "\"{effect}\" does not pass a constant, so the mean of the torque and its slope over the record are unknown, \
          and those of the result are arbitrary; record with DC coupling if you need them"
     )))
-}
-
-/// Natural frequency in Hz and damping ratio of a stand's modes.
-pub(super) fn modes(stand: &Stand) -> Vec<(f64, f64)> {
-    let modes = stand.modes().ok();
-    let parts = modes.iter().flat_map(|modes| modes.parts());
-    parts
-        .map(|part| (part.mode.natural_frequency_hz(), part.mode.damping_ratio))
-        .collect()
-}
-
-/// A warning if the record rings elsewhere than at the declared natural frequency.
-fn of_resonance<'a>(
-    report: &CompensateReport,
-    seen: &Seen,
-    rest: &dyn Fn() -> Option<&'a [f64]>,
-) -> Option<Warning> {
-    let (rate_hz, modes) = (report.rate_hz, &report.modes);
-    let rings = |samples: &[f64]| {
-        other_resonance(samples, rate_hz, modes)
-            .or_else(|| ringing_elsewhere(samples, rate_hz, modes))
-    };
-    let found = rings(&seen.excerpt)
-        .or_else(|| dominant_resonance(&seen.excerpt, rate_hz, modes))
-        .or_else(|| rest().and_then(rings))?;
-    let declared_hz = report.modes[0].0;
-    Some(WarningCode::ResonanceElsewhere.warning(format!(
-        "the record has a resonance at {} Hz (damping ratio about {}) and none at {} Hz, the natural frequency in \
-         the stand file{}: if it is the stand's, the result is wrong. Record a tap on the stand as it is and \
-         determine its constants with identify decay; if it is the machine's, ignore this",
-        rounded(found.frequency_hz, 3),
-        rounded(found.damping_ratio, 1),
-        rounded(declared_hz, 4),
-        of_turns(declared_hz, found.frequency_hz).unwrap_or_default()
-    )))
-}
-
-/// A warning if the record rings at the declared natural frequency with another damping.
-fn of_damping<'a>(
-    report: &CompensateReport,
-    seen: &Seen,
-    rest: &dyn Fn() -> Option<&'a [f64]>,
-) -> Option<Warning> {
-    let &[declared] = report.modes.as_slice() else {
-        return None;
-    };
-    let found = |samples: &[f64]| other_damping(samples, report.rate_hz, declared);
-    let found = found(&seen.excerpt).or_else(|| rest().and_then(found))?;
-    Some(WarningCode::DampingDiffers.warning(format!(
-        "the resonance of the record at {} Hz has a damping ratio of about {}, {} in the stand file: if it is the \
-         stand's, the result is wrong by up to their ratio near that frequency. Record a tap on the stand as it is \
-         and determine its constants with identify decay",
-        rounded(found.frequency_hz, 3),
-        rounded(found.damping_ratio, 1),
-        rounded(declared.1, 3)
-    )))
-}
-
-/// Largest relative deviation of the ratio of two frequencies from 2π.
-const TURNS: f64 = 0.05;
-
-/// Note if rad/s and Hz seem to be confused.
-fn of_turns(declared_hz: f64, found_hz: f64) -> Option<String> {
-    let is_turn = |ratio: f64| (ratio / std::f64::consts::TAU - 1.0).abs() < TURNS;
-    let [declared, found] = [declared_hz, found_hz].map(|hz| rounded(hz, 4));
-    if is_turn(declared_hz / found_hz) {
-        Some(format!(
-            ", which is about 2 pi times as high ({declared} rad/s is {} Hz; was it written in Hz?)",
-            rounded(declared_hz / std::f64::consts::TAU, 4)
-        ))
-    } else if is_turn(found_hz / declared_hz) {
-        Some(format!(
-            ", which is about 2 pi times as low ({found} rad/s is {} Hz; was it divided by 2 pi twice?)",
-            rounded(found_hz / std::f64::consts::TAU, 4)
-        ))
-    } else {
-        None
-    }
 }
 
 fn of_unknown_noise(report: &CompensateReport) -> Option<Warning> {

@@ -1,9 +1,9 @@
 //! `identify runup`.
 
 use super::factor::factor_of;
-use torqcomp_model::Dimension;
+use torqcomp_model::{Dimension, Unit};
 
-use super::{Recorded, deliver, entry, radius, unit_or};
+use super::{Recorded, deliver, entry, radius, stand_text, unit_or};
 use crate::cli::identify::Runup;
 use crate::commands::Outcome;
 use crate::failure::{ErrorCode, Failure};
@@ -14,7 +14,8 @@ use crate::io::{ChannelChoice, Input};
 use crate::print::short;
 use crate::quality;
 use crate::recording::{AlignedChannels, Channel};
-use crate::stand::update::Entry;
+use crate::stand::{self, update::Entry};
+use crate::unit::NamedUnit;
 
 /// Runs the test.
 pub fn run(args: &Runup) -> Result<Outcome, Failure> {
@@ -33,7 +34,7 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
              derivative{}",
             motion.name,
             motion_unit.text,
-            gravity_hint(&motion_unit).map_or(String::new(), |hint| format!(": {hint}"))
+            hint(&motion_unit).map_or(String::new(), |hint| format!(": {hint}"))
         ))
     })?;
     let factors = [
@@ -60,6 +61,11 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
         half_window_s: args.window,
     };
     let result = identify(&run, &options)?;
+    // A stand file that is not complete yet says nothing of the resonance.
+    let stand = stand_text(&args.findings)?;
+    let stand = stand.and_then(|(name, text)| stand::parse(&name, &text).ok());
+    let modes = stand.map_or_else(Vec::new, |stand| stand.resonances());
+    let resonance = quality::resonance::warning(effort, read.rate_hz, &modes);
     let entries = entries(args, &result)?;
     let mut recorded = Recorded::default();
     recorded.add(
@@ -68,8 +74,17 @@ pub fn run(args: &Runup) -> Result<Outcome, Failure> {
         Some((read.rate_hz, read.rate_std_hz)),
     );
     recorded.warn(faults, false);
+    recorded.warnings.extend(resonance);
     recorded.warn(read.warnings, read.is_lossy);
     deliver(result, recorded, &args.findings, &entries)
+}
+
+/// What to write for a unit that is none of a motion.
+fn hint(unit: &NamedUnit) -> Option<&'static str> {
+    let per_second =
+        Unit::parse("1/s").is_ok_and(|second| second.dimension() == unit.unit.dimension());
+    let turns = "for turns per second give --motion-unit rev/s, for radians per second rad/s";
+    gravity_hint(unit).or(per_second.then_some(turns))
 }
 
 /// The entry of the stand file: the inertia.
