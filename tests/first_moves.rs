@@ -56,6 +56,68 @@ fn a_zero_of_another_quantity_is_said() {
     assert!(codes(&report).contains(&"zero-not-used"), "{report}");
 }
 
+/// A load cell with a lever arm: the key of a torque, and its number.
+#[test]
+fn a_calibration_of_forces_is_answered_with_the_torque() {
+    let folder = Folder::new();
+    folder.write("in.csv", over_time("U [V]", 1000.0, 2000, |t| t));
+    let arm = "lever_arm = \"0.5 m\"\n";
+    for (form, says) in [
+        (
+            format!("force_per_volt = \"50 N/V\"\n{arm}"),
+            "torque_per_volt = \"25 N m/V\"; omit lever_arm",
+        ),
+        (
+            format!("torque_per_volt = \"50 N/V\"\n{arm}"),
+            "torque_per_volt = \"25 N m/V\"; omit lever_arm",
+        ),
+        (
+            "force_per_volt = \"50 N/V\"\n".to_owned(),
+            "at 1 m it is torque_per_volt = \"50 N m/V\"",
+        ),
+        (
+            format!("force_per_ratio = \"250 N/(mV/V)\"\n{arm}"),
+            "torque_per_ratio = \"125 N m/(mV/V)\"",
+        ),
+        (
+            format!("sensitivity = \"2 V\"\nrated_torque = \"500 N\"\n{arm}"),
+            "rated_torque = \"250 N m\"; omit lever_arm",
+        ),
+        (
+            format!("sensitivity = \"2 V\"\nrated_force = \"500 N\"\n{arm}"),
+            "rated_torque = \"250 N m\"; omit lever_arm",
+        ),
+    ] {
+        folder.write("stand.toml", stand(&format!("[calibration]\n{form}")));
+        folder.run(&COMPENSATE).says(1, &[says]);
+    }
+    let right = "[calibration]\nsensitivity = \"2 V\"\nrated_torque = \"250 N m\"\n";
+    folder.write("stand.toml", stand(right));
+    folder.run(&COMPENSATE).says(0, &[]);
+}
+
+/// Two sensors of one logger that write their rows in turn, without a column that names them.
+#[test]
+fn two_sensors_in_turn_are_said() {
+    let two = |t: f64, i: usize| match i % 2 {
+        0 => 2.0 + (20.0 * t).sin(),
+        _ => 2.0 + 0.9 * (33.0 * t + 1.0).sin(),
+    };
+    let folder = Folder::new();
+    folder.write("stand.toml", stand(""));
+    let one = |t: f64, _: usize| 2.0 + (20.0 * t).sin();
+    let ripple = |t: f64, i: usize| one(t, i) + 0.3 * (TAU * 400.0 * t).sin();
+    let records: [(&dyn Fn(f64, usize) -> f64, bool); 3] =
+        [(&two, true), (&one, false), (&ripple, false)];
+    for (value, is_said) in records {
+        let row =
+            |i: usize| value(i as f64 / 1000.0, i) + 1e-3 * ((i * 7919 % 101) as f64 / 50.0 - 1.0);
+        folder.write("in.csv", sampled("T [N m]", 1000.0, 4000, row));
+        let report = folder.json(&[&COMPENSATE[..], &["--json", "--force"]].concat());
+        assert_eq!(codes(&report).contains(&"two-signals"), is_said, "{report}");
+    }
+}
+
 #[test]
 fn a_gain_below_any_amplifier_is_asked() {
     let folder = Folder::new();

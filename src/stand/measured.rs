@@ -1,6 +1,7 @@
 //! Parsing of `[calibration]`: data of certificates and data sheets.
 
 use nalgebra::DMatrix;
+use torqcomp_decimal::digits;
 use torqcomp_dsp::curve::CalibrationCurve;
 use torqcomp_model::fit::linear;
 use torqcomp_model::{Estimate, Kind, UnitSystem};
@@ -91,8 +92,65 @@ const FORMS: [&str; 6] = [
     "lever_arm",
 ];
 
+/// Keys that take a torque and those under which a force may be given, with the kind, unit and size of the torque in SI
+/// units.
+const OF_TORQUE: [(&str, &str, Kind, &str, f64); 3] = [
+    (
+        "torque_per_volt",
+        "force_per_volt",
+        Kind::TorquePerVolt,
+        "N m/V",
+        1.0,
+    ),
+    (
+        "torque_per_ratio",
+        "force_per_ratio",
+        Kind::TorquePerRatio,
+        "N m/(mV/V)",
+        1e3,
+    ),
+    ("rated_torque", "rated_force", Kind::Torque, "N m", 1.0),
+];
+
+/// Answers a force in place of a torque with the torque at the lever arm.
+///
+/// # Errors
+/// If there is one.
+fn refuse_forces(section: &Section) -> Result<(), Failure> {
+    let arm = section.glance("lever_arm");
+    for (key, of_force, kind, unit, size) in OF_TORQUE {
+        let given = [of_force, key].into_iter().find(|key| section.has(key));
+        let text = given.and_then(|given| section.glance(given));
+        let parts = text.and_then(|text| text.trim().split_once(' '));
+        // With a force, that is the torque per metre of the arm.
+        let torque = parts.map(|(number, unit)| kind.parse(&format!("{number} m {unit}")));
+        let (Some(given), Some(text), Some(Ok(torque))) = (given, text, torque) else {
+            continue;
+        };
+        let arm_m = Kind::Length.parse(arm.unwrap_or("1 m"));
+        let arm_m = arm_m.map_err(|error| section.fail("lever_arm", error))?;
+        let torque = digits::text(torque * arm_m / size, 6);
+        let is_alone = key == "rated_torque" && !section.has("sensitivity");
+        let how = match arm {
+            Some(arm) => format!("at the lever_arm of {arm} it is {key} = \"{torque} {unit}\""),
+            None => {
+                format!("multiply it by the lever arm; at 1 m it is {key} = \"{torque} {unit}\"")
+            }
+        };
+        let omit = if arm.is_none() || is_alone {
+            ""
+        } else {
+            "; omit lever_arm"
+        };
+        let message = format!("\"{text}\" has a force in place of a torque; {how}{omit}");
+        return Err(section.fail(given, message));
+    }
+    Ok(())
+}
+
 /// Reads the section.
 pub(super) fn calibration(section: &Section) -> Result<MeasuredCalibration, Failure> {
+    refuse_forces(section)?;
     let given: Vec<&str> = FORMS.into_iter().filter(|key| section.has(key)).collect();
     if let [first, second, ..] = given[..] {
         return Err(section.fail(

@@ -72,8 +72,18 @@ impl<'a> Section<'a> {
             "{} {key} is not listed in keys.rs",
             self.title
         );
-        self.asked.borrow_mut().push(key);
+        let mut asked = self.asked.borrow_mut();
+        if !asked.contains(&key) {
+            asked.push(key);
+        }
         self.table.get(key)
+    }
+
+    /// The text of a key, known or not, without requesting it.
+    pub fn glance(&self, key: &str) -> Option<&'a str> {
+        let item = self.table.get(key)?;
+        let value = item.as_table_like().and_then(|table| table.get("value"));
+        value.unwrap_or(item).as_str()
     }
 
     /// A failure at a key, or at the section if the key is missing.
