@@ -43,6 +43,54 @@ fn a_count_that_jumps_is_said() {
     assert!(!whole.to_string().contains("counter-jumps"), "{whole}");
 }
 
+/// A count that jumps, and a clock that slows down, far beyond the first rows, in memory and as a stream.
+#[test]
+fn the_whole_record_is_checked_for_missing_rows_and_other_clocks() {
+    let folder = Folder::new();
+    let mut noise = Noise(53);
+    let stand = "schema = \"torqcomp.stand/1\"\n[mechanics]\nnatural_frequency = \"60 Hz\"\ndamping_ratio = 0.02\n";
+    folder.write("stand.toml", stand);
+    let rows = 60_000;
+    let torque =
+        |i: usize, noise: &mut Noise| 5.0 + (0.05 * i as f64).sin() + 0.01 * noise.normal();
+    let mut counts = "Sample,torque_Nm\n".to_owned();
+    let mut clocks = "dev_time_s,torque_Nm,pc_time_s\n".to_owned();
+    for i in 0..rows {
+        let lost = if i < 50_000 { 0 } else { 137 };
+        let _ = writeln!(counts, "{},{:.5}", i + lost, torque(i, &mut noise));
+        let t = i as f64 / 1000.0;
+        let slower = t - 0.02 * (t - 20.0).max(0.0);
+        let _ = writeln!(clocks, "{t:.4},{:.5},{slower:.6}", torque(i, &mut noise));
+    }
+    let rate = ["--rate", "1000"];
+    for (text, more, code, says) in [
+        (&counts, &rate[..], "counter-jumps", "137 rows are missing"),
+        (&clocks, &[][..], "clocks-disagree", "1.3 % slower"),
+    ] {
+        folder.write("in.csv", text);
+        let command =
+            "compensate in.csv --stand stand.toml --channel torque -o out.csv --force --json";
+        for verb in [
+            command,
+            "extract in.csv --channel torque -o out.csv --force",
+            "inspect in.csv --json",
+        ] {
+            let args = [&verb.split(' ').collect::<Vec<_>>(), more].concat();
+            let ran = folder.run(&args);
+            let told = ran.stdout + &ran.stderr;
+            assert!(told.contains(code) && told.contains(says), "{verb}: {told}");
+        }
+        // Cut before that, nothing is said.
+        let first: String = text
+            .lines()
+            .take(15_000)
+            .map(|line| format!("{line}\n"))
+            .collect();
+        let report = inspected(&folder, &first, more).to_string();
+        assert!(!report.contains(code), "{report}");
+    }
+}
+
 #[test]
 fn sources_in_turn_are_named_by_their_column() {
     let folder = Folder::new();

@@ -7,7 +7,7 @@ use super::block::{Block, BlockSource};
 use super::joined::JoinedBreaks;
 use super::stamps::IrregularStep;
 use super::stream::ChannelStream;
-use super::text::{ChannelPlan, Layout, LineNotes, Problem, is_end_of_data};
+use super::text::{ChannelPlan, Layout, LineNotes, Problem, Rows, is_end_of_data};
 use crate::failure::{ErrorCode, ErrorPlace, Failure, RowKind};
 use crate::print::plural;
 use crate::warning::{Warning, WarningCode};
@@ -47,7 +47,12 @@ pub(super) struct TextLines {
     notes: LineNotes,
     /// Whether a line marked the end of the data.
     ended: bool,
+    /// The last rows so far, if the last one is needed.
+    last_rows: Vec<u8>,
 }
+
+/// Number of last rows that are kept, as the last line may be another one.
+const LAST_ROWS: usize = 3;
 
 impl TextLines {
     /// The lines of a table.
@@ -57,6 +62,35 @@ impl TextLines {
             layout,
             notes: LineNotes::default(),
             ended: false,
+            last_rows: Vec::new(),
+        }
+    }
+
+    /// Keeps the last rows of a block, if they are needed.
+    fn keep_last_rows(&mut self, text: &[u8]) {
+        if self.layout.axes.needs_last_row() && text.iter().any(u8::is_ascii_digit) {
+            let mut ends = memchr::memrchr_iter(b'\n', text.trim_ascii_end());
+            let from = ends.nth(LAST_ROWS - 1).map_or(0, |end| end + 1);
+            self.last_rows.clear();
+            self.last_rows.extend_from_slice(&text[from..]);
+        }
+    }
+
+    /// Warnings that the last row shows.
+    fn of_last_row(&self, rows: usize) -> Vec<Warning> {
+        let mut last = Rows::default();
+        last.begin(0, self.layout.plan.kinds.len());
+        let read = last.read(&self.last_rows, &self.layout.plan);
+        let value = |place: usize| {
+            let values = &last.columns[place].values;
+            values
+                .last()
+                .copied()
+                .filter(|_| values.len() == last.count)
+        };
+        match read {
+            Ok(_) if last.count > 0 => self.layout.axes.of_last_row(rows, &value),
+            _ => Vec::new(),
         }
     }
 }
@@ -120,7 +154,8 @@ impl StreamValidator {
                 return Err(self.irregular(line, &found));
             }
         }
-        if self.text.is_some() {
+        if let Some(text) = &mut self.text {
+            text.keep_last_rows(&block.text);
             self.look_at_lines(block)?;
             self.lines += block.rows.lines;
         } else {
@@ -226,6 +261,7 @@ impl StreamValidator {
         if let Some(text) = &self.text {
             let more = text.layout.warnings(&text.notes, self.samples);
             self.warnings.extend(more);
+            self.warnings.extend(text.of_last_row(self.samples));
         }
         if let Some(grid) = &self.time.beside {
             let joined = self.joined.warning(&self.source, grid);

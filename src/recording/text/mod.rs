@@ -60,7 +60,7 @@ use keys::HeaderEntry;
 pub use last_line::{LastLine, last_line};
 use makers::Maker;
 use rows::ColumnKind;
-pub use rows::{LineNotes, RowPlan};
+pub use rows::{LineNotes, RowPlan, Rows};
 pub(in crate::recording) use skipped_columns::is_about_one as is_of_skipped_column;
 pub use stream::{BRIDGE, ChannelPlan, ChannelRows, Problem, StampColumn, StampUse, TextStream};
 pub use table::Layout;

@@ -317,6 +317,13 @@ impl Layout {
         let longest = rows.columns.iter().map(|column| column.values.len()).max();
         let mut warnings = self.warnings(&rows.notes, longest.unwrap_or(0));
         warnings.extend(skipped);
+        let (count, last): (usize, &dyn Fn(usize) -> Option<f64>) = match &tail {
+            Some(tail) => (tail.count(), &|place| tail.last(place)),
+            None => (rows.count, &|place| {
+                rows.columns[place].values.last().copied()
+            }),
+        };
+        warnings.extend(self.axes.of_last_row(count, last));
         let starts = match self.block_rows {
             Some(size) => (size..rows.count).step_by(size).collect(),
             None => blocks::restarts(&rows, &self.plan.kinds, &self.axes.roles),

@@ -97,6 +97,16 @@ impl Tail {
         Ok(end)
     }
 
+    /// Number of rows.
+    pub fn count(&self) -> usize {
+        self.before
+    }
+
+    /// Last value of a column.
+    pub fn last(&self, place: usize) -> Option<f64> {
+        self.columns[place].last
+    }
+
     /// Statistics of all samples of each channel of the kept rows.
     pub fn of_channels(&self, layout: &Layout, kept: &[Channel]) -> Vec<Option<AllSamples>> {
         let roles = layout.axes.roles.iter().enumerate();

@@ -1,7 +1,9 @@
 //! Columns of counts and of sources, which show that rows are missing or belong to several signals.
 
+use torqcomp_decimal::digits;
+
 use super::Sources;
-use crate::print::{enumeration, plural, short};
+use crate::print::{enumeration, short};
 use crate::recording::text::units;
 use crate::warning::{Warning, WarningCode};
 
@@ -14,10 +16,44 @@ const SOURCES: [&str; 8] = [
     "id", "joint", "axis", "sensor", "channel", "node", "address", "source",
 ];
 
+/// A column that counts the rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RowCounter {
+    pub(super) place: usize,
+    heading: String,
+    first: f64,
+    /// The number before its first jump in the first rows.
+    before_jump: Option<f64>,
+}
+
+impl RowCounter {
+    /// A warning if it has counted more rows than there are, up to its number in the last one: a given rate hides that.
+    pub(super) fn warning(&self, last: f64, rows: usize) -> Option<Warning> {
+        let missing = last - self.first + 1.0 - rows as f64;
+        let after = self
+            .before_jump
+            .map(|before| format!(", first after {}", short(before)));
+        (missing >= 1.0).then(|| {
+            WarningCode::CounterJumps.warning(format!(
+                "\"{}\" counts from {} to {} in {rows} rows: it jumps{}, {} missing, and at a constant rate all that \
+                 follows is too early; select a part without jumps with --range, or write the count divided by the rate \
+                 into a column of time, and give --fill in place of --rate",
+                self.heading,
+                digits::text(self.first, 15),
+                digits::text(last, 15),
+                after.unwrap_or_default(),
+                match missing as usize {
+                    1 => "1 row is".to_owned(),
+                    missing => format!("{missing} rows are"),
+                },
+            ))
+        })
+    }
+}
+
 impl Sources<'_> {
-    /// A warning about a column that counts the rows and jumps: rows are missing, which a given rate hides. `times` are the
-    /// columns with the time, which would show it as well.
-    pub(super) fn jumping_counter(&self, used: &[usize], times: &[usize]) -> Option<Warning> {
+    /// The column that counts the rows, if no column gives the time: `times` are those that do.
+    pub(super) fn row_counter(&self, used: &[usize], times: &[usize]) -> Option<RowCounter> {
         let place = *used.first().filter(|_| times.is_empty())?;
         let field = &self.fields[place];
         let is_named = units::is_index_name(&field.name) || units::is_axis_name(&field.name);
@@ -28,29 +64,12 @@ impl Sources<'_> {
         let steps = || values.windows(2).map(|pair| pair[1] - pair[0]);
         let counts =
             values[0].fract() == 0.0 && steps().all(|step| step >= 1.0 && step.fract() == 0.0);
-        let jumps: Vec<(f64, f64)> = values
-            .iter()
-            .zip(steps())
-            .filter(|(_, step)| *step > 1.0)
-            .map(|(value, step)| (*value, step - 1.0))
-            .collect();
-        let (first, lost) = (
-            jumps.first()?,
-            jumps.iter().map(|(_, lost)| lost).sum::<f64>(),
-        );
-        (counts && 2 * jumps.len() < values.len()).then(|| {
-            WarningCode::CounterJumps.warning(format!(
-                "\"{}\" counts the rows and jumps {} (first after {}): {} missing, and at a constant rate all \
-                 that follows is too early; select a part without jumps with --range, or write the count divided by the \
-                 rate into a column of time, and give --fill in place of --rate",
-                field.heading,
-                plural(jumps.len(), "time"),
-                short(first.0),
-                match lost as usize {
-                    1 => "1 row is".to_owned(),
-                    lost => format!("{lost} rows are"),
-                },
-            ))
+        let jumps = || values.iter().zip(steps()).filter(|(_, step)| *step > 1.0);
+        (counts && 2 * jumps().count() < values.len()).then(|| RowCounter {
+            place,
+            heading: field.heading.clone(),
+            first: values[0] + self.origin(place),
+            before_jump: jumps().next().map(|(value, _)| value + self.origin(place)),
         })
     }
 

@@ -69,50 +69,102 @@ impl Sources<'_> {
         group.times.iter().filter(is_other).map(warning).collect()
     }
 
-    /// Warnings about further columns in a unit of time that rise like a clock, faster or slower than that of the rows.
-    pub(super) fn other_clocks(&self, group: &Group, rule: &AxisRule) -> Vec<Warning> {
+    /// Further columns in a unit of time that rise like the clock of the rows.
+    pub(super) fn other_clocks(&self, group: &Group, rule: &AxisRule) -> Vec<OtherClock> {
         let Some(rule) = &rule.stamps else {
             return Vec::new();
         };
         let stamps = rule.stamps(self.columns);
         let both = group.times.iter().chain(&group.channels);
         let others = both.filter(|place| **place != rule.place && !self.fields[**place].is_label);
-        let warning = |place: &usize| {
+        let clock = |place: &usize| {
             let named = self.fields[*place].unit.as_ref();
             let seconds = named.filter(|named| named.is_time())?.unit.factor();
-            let faster = faster(&self.columns[*place].values, seconds, &stamps)?;
-            Some(WarningCode::ClocksDisagree.warning(format!(
-                "\"{}\" runs {} % {} than \"{}\", the time of the rows: find out which clock is right, and choose it \
-                 with --time-column",
-                self.fields[*place].heading,
-                rounded(100.0 * faster.abs(), 2),
-                if faster > 0.0 { "faster" } else { "slower" },
-                rule.heading
-            )))
+            let values = &self.columns[*place].values;
+            let values: Vec<f64> = values.iter().map(|value| value * seconds).collect();
+            Some(OtherClock {
+                heading: self.fields[*place].heading.clone(),
+                own: ClockColumn {
+                    // The time keeps its origin in all rows.
+                    origin: match group.times.contains(place) {
+                        true => 0.0,
+                        false => self.origin(*place),
+                    },
+                    ..ClockColumn::of(*place, seconds, &values)?
+                },
+                of_rows: rule.heading.clone(),
+                other: ClockColumn::of(rule.place, rule.seconds_per_unit, &stamps)?,
+                is_of_one_cell: rule.is_of_one_cell() && rule.period_s.is_none(),
+            })
+            .filter(|_| !runs_otherwise(&values, &stamps))
         };
-        others.filter_map(warning).collect()
+        others.filter_map(clock).collect()
     }
 }
 
-/// By how much values in a unit of time run faster than stamps in s, if both rise like clocks and differ by more than clocks
-/// and the roughness of the stamps.
-fn faster(values: &[f64], seconds: f64, stamps: &[f64]) -> Option<f64> {
-    let count = values.len().min(stamps.len());
-    let rises = |all: &[f64]| all.windows(2).all(|pair| pair[1] >= pair[0]);
-    if count < ROWS || !rises(values) || !rises(stamps) || runs_otherwise(values, stamps) {
-        return None;
+/// A column that rises like a clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ClockColumn {
+    place: usize,
+    seconds_per_unit: f64,
+    /// Origin of the first rows only.
+    origin: f64,
+    /// The first and last value in the first rows, and the largest step between them, in s.
+    first: f64,
+    last: f64,
+    step: f64,
+}
+
+impl ClockColumn {
+    fn of(place: usize, seconds_per_unit: f64, seconds: &[f64]) -> Option<Self> {
+        let steps = || seconds.windows(2).map(|pair| pair[1] - pair[0]);
+        let rises = seconds.len() >= ROWS && steps().all(|step| step >= 0.0);
+        rises.then(|| Self {
+            place,
+            seconds_per_unit,
+            origin: 0.0,
+            first: seconds[0],
+            last: seconds[seconds.len() - 1],
+            step: steps().fold(0.0, f64::max),
+        })
     }
-    let of = |all: &[f64]| {
-        let largest = all
-            .windows(2)
-            .map(|pair| pair[1] - pair[0])
-            .fold(0.0, f64::max);
-        (all[count - 1] - all[0], largest)
-    };
-    let ((own, own_step), (other, other_step)) = (of(values), of(stamps));
-    let faster = seconds * own / other - 1.0;
-    let least = CLOCKS.max(STEPS * (own_step / own).max(other_step / other));
-    (faster.abs() > least && faster.abs() < MOST).then_some(faster)
+}
+
+/// A column in a unit of time beside the one used for the rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OtherClock {
+    heading: String,
+    own: ClockColumn,
+    of_rows: String,
+    other: ClockColumn,
+    /// Whether the last row alone gives its time.
+    is_of_one_cell: bool,
+}
+
+impl OtherClock {
+    /// A warning if it is faster or slower than the clock of the rows, by more than clocks and the roughness of the stamps;
+    /// `last` has the values of the last row.
+    pub(super) fn warning(&self, last: &dyn Fn(usize) -> Option<f64>) -> Option<Warning> {
+        let at_end = |clock: &ClockColumn| {
+            Some((last(clock.place)? - clock.origin) * clock.seconds_per_unit)
+        };
+        let ends = at_end(&self.own).zip(at_end(&self.other));
+        let ends = ends.filter(|_| self.is_of_one_cell);
+        let (own, other) = ends.unwrap_or((self.own.last, self.other.last));
+        let (own, other) = (own - self.own.first, other - self.other.first);
+        let faster = own / other - 1.0;
+        let least = CLOCKS.max(STEPS * (self.own.step / own).max(self.other.step / other));
+        (faster.abs() > least && faster.abs() < MOST).then(|| {
+            WarningCode::ClocksDisagree.warning(format!(
+                "\"{}\" runs {} % {} than \"{}\", the time of the rows: find out which clock is right, and choose it \
+                 with --time-column",
+                self.heading,
+                rounded(100.0 * faster.abs(), 2),
+                if faster > 0.0 { "faster" } else { "slower" },
+                self.of_rows
+            ))
+        })
+    }
 }
 
 /// Whether two time columns differ in the middle.

@@ -21,7 +21,9 @@ use crate::io::Reading;
 use crate::recording::moment::Moment;
 use crate::recording::{RateFrom, TimeAxis};
 use crate::warning::Warning;
+use counters::RowCounter;
 use groups::{Group, groups};
+use left_out::OtherClock;
 pub use stamps::StampRule;
 
 /// Largest relative difference of a header rate from that of the stamps, or from another one, for both to mean the
@@ -55,6 +57,25 @@ pub struct AxisPlan {
     pub rules: Vec<AxisRule>,
     /// Warnings about columns named like time.
     pub warnings: Vec<Warning>,
+    /// Column that counts the rows.
+    counter: Option<RowCounter>,
+    /// Clocks beside those of the rows.
+    clocks: Vec<OtherClock>,
+}
+
+impl AxisPlan {
+    /// Whether the last row shows that rows are missing, or clocks differ.
+    pub fn needs_last_row(&self) -> bool {
+        self.counter.is_some() || !self.clocks.is_empty()
+    }
+
+    /// Warnings about missing rows and different clocks; `last` has the values of the last of these rows.
+    pub fn of_last_row(&self, rows: usize, last: &dyn Fn(usize) -> Option<f64>) -> Vec<Warning> {
+        let counter = self.counter.iter();
+        let counter = counter.filter_map(|counter| counter.warning(last(counter.place)?, rows));
+        let clocks = self.clocks.iter().filter_map(|clock| clock.warning(last));
+        counter.chain(clocks).collect()
+    }
 }
 
 /// Rule for the time of channels.
@@ -173,9 +194,8 @@ impl Sources<'_> {
             let own = self.own_times(&named.times, &rest);
             named.times.extend(own);
         }
-        let (mut rules, mut warnings) = (Vec::new(), Vec::new());
+        let (mut rules, mut warnings, mut clocks) = (Vec::new(), Vec::new(), Vec::new());
         warnings.extend(self.falling_time(&rest, &named.times));
-        warnings.extend(self.jumping_counter(&used, &named.times));
         warnings.extend(self.sources_in_turn(&rest));
         for group in groups(&named.times, &rest) {
             group
@@ -185,7 +205,7 @@ impl Sources<'_> {
             let rule = self.rule(&group, named.assumed.as_deref())?;
             self.refuse_two_clocks(&group, &rule)?;
             warnings.extend(self.other_times(&group, &rule));
-            warnings.extend(self.other_clocks(&group, &rule));
+            clocks.extend(self.other_clocks(&group, &rule));
             warnings.extend(self.overridden_unit(&rule));
             // The time of columns without numbers is not a channel.
             let is_channel = |place: &&usize| !self.fields[**place].is_label;
@@ -198,6 +218,8 @@ impl Sources<'_> {
             roles,
             rules,
             warnings,
+            counter: self.row_counter(&used, &named.times),
+            clocks,
         })
     }
 
