@@ -89,9 +89,13 @@ pub struct RecordedChannel<'a> {
 impl RecordedChannel<'_> {
     /// Failure for a unit that is unknown as spelled in the file, with what to do.
     pub(crate) fn unknown_unit(&self, text: &str, advice: &str) -> Failure {
-        let why = Unit::parse(text)
-            .err()
-            .map_or_else(String::new, |error| format!(": {error}"));
+        let why = match (scale_in(text), Unit::parse(text)) {
+            (Some(scale), _) => format!(
+                ": its factor \"{scale}\" may multiply or divide the numbers (thousands of rpm are krpm)"
+            ),
+            (None, Err(error)) => format!(": {error}"),
+            (None, Ok(_)) => String::new(),
+        };
         ErrorCode::UnitUnclear.failed(format_args!(
             "the unit \"{text}\" of the channel \"{}\" is unknown{why}; {advice}",
             self.name

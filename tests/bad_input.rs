@@ -497,7 +497,11 @@ fn a_record_cut_in_its_last_line_is_used_up_to_there() {
 #[test]
 fn a_table_over_frequency_is_no_record() {
     let folder = Folder::new();
-    for heading in ["Frequency (Hz),Magnitude (dB),Phase (deg)", "freq,Re,Im"] {
+    for heading in [
+        "Frequency (Hz),Magnitude (dB),Phase (deg)",
+        "freq,Re,Im",
+        "frequency_hz,magnitude,phase_deg",
+    ] {
         let rows = (1..200).map(|k| format!("{},{},{}\n", 5 * k, 0.01 * f64::from(k), -k));
         folder.write("in.csv", format!("{heading}\n{}", rows.collect::<String>()));
         let more = ["--channel", "2", "--unit", "N m"];
