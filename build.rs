@@ -1,7 +1,7 @@
-//! Says which commit and target a build is of, for `torqcomp --version`, and packs the schemas of `torqcomp schema`.
+//! Says which commit and target a build is of, for `torqcomp --version`, and packs its long texts.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use flate2::Compression;
@@ -16,9 +16,16 @@ const SHOWN: usize = 12;
 /// The JSON Schemas of the documents.
 const SCHEMAS: &str = "src/commands/schema";
 
+/// Further texts.
+const TEXTS: [&str; 3] = [
+    "src/chart/page.css",
+    "src/chart/zoom.js",
+    "src/recording/text/vocabulary.txt",
+];
+
 fn main() {
     let variable = |name: &str| std::env::var(name).unwrap_or_default();
-    pack_schemas(Path::new(&variable("OUT_DIR")));
+    pack_texts(Path::new(&variable("OUT_DIR")));
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rustc-env=TORQCOMP_TARGET={}", variable("TARGET"));
     // A commit changes the version, and so all that is built after it. Builds without optimisation are for work in between.
@@ -31,23 +38,22 @@ fn main() {
     println!("cargo::rustc-env=TORQCOMP_ORIGIN={origin}");
 }
 
-/// Compresses the schemas, which would be 2 % of a binary.
-fn pack_schemas(folder: &Path) {
+/// Compresses the texts, which would be 3 % of a binary, into files of the same names with `.z`.
+fn pack_texts(folder: &Path) {
     println!("cargo::rerun-if-changed={SCHEMAS}");
-    for entry in std::fs::read_dir(SCHEMAS).expect("the folder of the schemas") {
-        let path = entry.expect("a readable folder").path();
-        let Some(name) = path
-            .file_name()
-            .filter(|_| path.extension().is_some_and(|e| e == "json"))
-        else {
-            continue;
-        };
+    let schemas = std::fs::read_dir(SCHEMAS).expect("the folder of the schemas");
+    let schemas = schemas.map(|entry| entry.expect("a readable folder").path());
+    let schemas = schemas.filter(|path| path.extension().is_some_and(|e| e == "json"));
+    let texts = TEXTS.iter().map(PathBuf::from).chain(schemas);
+    for path in texts {
+        println!("cargo::rerun-if-changed={}", path.display());
         let mut packed = DeflateEncoder::new(Vec::new(), Compression::best());
-        let text = std::fs::read(&path).expect("a readable schema");
+        let text = std::fs::read(&path).expect("a readable text");
         packed.write_all(&text).expect("memory takes all");
         let packed = packed.finish().expect("memory takes all");
-        std::fs::write(folder.join(name).with_extension("json.z"), packed)
-            .expect("a writable folder");
+        let mut name = path.file_name().expect("a file").to_owned();
+        name.push(".z");
+        std::fs::write(folder.join(name), packed).expect("a writable folder");
     }
 }
 

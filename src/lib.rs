@@ -15,6 +15,7 @@ pub mod io;
 mod log;
 mod noise_colour;
 mod outcome;
+mod packed_text;
 mod parallel;
 mod pipeline;
 pub mod print;

@@ -3,12 +3,13 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{Chart, STYLE as CHART_STYLE, Series};
+use crate::packed_text::{packed, unpack};
 use crate::print::visible;
 
 /// Style of the page.
-const STYLE: &str = include_str!("page.css");
+const STYLE: &[u8] = packed!("page.css");
 /// Zoom and values under the cursor; without it the charts are static.
-const SCRIPT: &str = include_str!("zoom.js");
+const SCRIPT: &[u8] = packed!("zoom.js");
 
 /// Length of the longest cell above which a column contains prose.
 const PROSE: usize = 36;
@@ -123,13 +124,13 @@ impl Page {
                     meta name="viewport" content="width=device-width, initial-scale=1";
                     meta name="color-scheme" content="light dark";
                     title { (self.title) }
-                    style { (PreEscaped(CHART_STYLE)) (PreEscaped(STYLE)) }
+                    style { (PreEscaped(CHART_STYLE)) (PreEscaped(unpack(STYLE))) }
                 }
                 "\n"
                 body {
                     "\n"
                     @for part in &self.body { (part) "\n" }
-                    script { (PreEscaped(SCRIPT)) }
+                    script { (PreEscaped(unpack(SCRIPT))) }
                 }
             }
             "\n"

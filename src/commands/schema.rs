@@ -3,9 +3,6 @@
 #[cfg(test)]
 pub(crate) mod types;
 
-use std::io::Read;
-
-use flate2::read::DeflateDecoder;
 use serde_json::Value;
 
 use super::Outcome;
@@ -27,6 +24,7 @@ use crate::identify::Identification;
 use crate::log;
 #[cfg(test)]
 use crate::log::LogLine;
+use crate::packed_text::{packed, unpack};
 use crate::print::Report;
 use crate::progress;
 #[cfg(test)]
@@ -45,11 +43,7 @@ pub(crate) struct DocumentKind {
 impl DocumentKind {
     /// The JSON Schema.
     pub(crate) fn text(&self) -> String {
-        let mut text = String::new();
-        DeflateDecoder::new(self.packed)
-            .read_to_string(&mut text)
-            .expect("build.rs packed a text");
-        text
+        unpack(self.packed)
     }
 
     /// Description in one sentence.
@@ -68,7 +62,7 @@ macro_rules! documents {
         pub(crate) const DOCUMENTS: &[DocumentKind] = &[$(DocumentKind {
             name: $name,
             schema: $schema,
-            packed: include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".json.z")),
+            packed: packed!(concat!($name, ".json")),
         }),*];
     };
 }

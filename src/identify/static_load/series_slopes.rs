@@ -55,9 +55,13 @@ pub(super) fn refuse(points: &[Point], largest: f64, units: &LoadUnits) -> Resul
     }
     let lines = (1..).zip(&members);
     let lines = lines.filter_map(|(number, points)| GroupLine::of(number, points));
-    let mut lines: Vec<GroupLine> = lines.collect();
-    lines.sort_by(|a, b| a.slope.total_cmp(&b.slope));
-    let [low, .., high] = lines.as_slice() else {
+    let lines: Vec<GroupLine> = lines.collect();
+    let by_slope = |a: &&GroupLine, b: &&GroupLine| a.slope.total_cmp(&b.slope);
+    let ends = lines
+        .iter()
+        .min_by(by_slope)
+        .zip(lines.iter().max_by(by_slope));
+    let Some((low, high)) = ends.filter(|_| lines.len() > 1) else {
         return Ok(());
     };
     let sum = |of: fn(&GroupLine) -> f64| lines.iter().map(of).sum::<f64>();

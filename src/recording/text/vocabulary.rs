@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
+use crate::packed_text::{packed, unpack};
+
 /// A word and its meaning, if the list does not imply it.
 pub struct Word {
     pub text: &'static str,
@@ -10,7 +12,7 @@ pub struct Word {
 }
 
 static LISTS: LazyLock<HashMap<&'static str, Vec<Word>>> =
-    LazyLock::new(|| lists(include_str!("vocabulary.txt")));
+    LazyLock::new(|| lists(unpack(packed!("vocabulary.txt")).leak()));
 
 /// The words of a list, in their order.
 ///
