@@ -17,10 +17,10 @@ const SHOWN: usize = 12;
 const SCHEMAS: &str = "src/commands/schema";
 
 /// Further texts.
-const TEXTS: [&str; 3] = [
-    "src/chart/page.css",
-    "src/chart/zoom.js",
-    "src/recording/text/vocabulary.txt",
+const TEXTS: [(&str, &str); 3] = [
+    ("page.css", "src/chart/page.css"),
+    ("zoom.js", "src/chart/zoom.js"),
+    ("vocabulary.txt", "src/recording/text/vocabulary.txt"),
 ];
 
 fn main() {
@@ -38,23 +38,40 @@ fn main() {
     println!("cargo::rustc-env=TORQCOMP_ORIGIN={origin}");
 }
 
-/// Compresses the texts, which would be 3 % of a binary, into files of the same names with `.z`.
+/// Compresses the long texts, which would be 3 % of a binary: the schemas together, each after its name and without
+/// indentation, and each other text by itself.
 fn pack_texts(folder: &Path) {
-    println!("cargo::rerun-if-changed={SCHEMAS}");
-    let schemas = std::fs::read_dir(SCHEMAS).expect("the folder of the schemas");
-    let schemas = schemas.map(|entry| entry.expect("a readable folder").path());
-    let schemas = schemas.filter(|path| path.extension().is_some_and(|e| e == "json"));
-    let texts = TEXTS.iter().map(PathBuf::from).chain(schemas);
-    for path in texts {
+    let read = |path: &Path| {
         println!("cargo::rerun-if-changed={}", path.display());
+        std::fs::read_to_string(path).expect("a readable text")
+    };
+    let pack = |name: &str, text: &str| {
         let mut packed = DeflateEncoder::new(Vec::new(), Compression::best());
-        let text = std::fs::read(&path).expect("a readable text");
-        packed.write_all(&text).expect("memory takes all");
+        packed.write_all(text.as_bytes()).expect("memory takes all");
         let packed = packed.finish().expect("memory takes all");
-        let mut name = path.file_name().expect("a file").to_owned();
-        name.push(".z");
-        std::fs::write(folder.join(name), packed).expect("a writable folder");
+        std::fs::write(folder.join(format!("{name}.z")), packed).expect("a writable folder");
+    };
+    for (name, path) in TEXTS {
+        pack(name, &read(Path::new(path)));
     }
+    println!("cargo::rerun-if-changed={SCHEMAS}");
+    let entries = std::fs::read_dir(SCHEMAS).expect("the folder of the schemas");
+    let paths = entries.map(|entry| entry.expect("a readable folder").path());
+    let mut paths: Vec<PathBuf> = paths
+        .filter(|path| path.extension().is_some_and(|e| e == "json"))
+        .collect();
+    paths.sort();
+    let mut all = String::new();
+    for path in &paths {
+        let name = path.file_stem().expect("a file").to_string_lossy();
+        all += &format!("{name}\n");
+        for line in read(path).lines() {
+            all += line.trim_start();
+            all.push('\n');
+        }
+        all.push('\0');
+    }
+    pack("schemas", &all);
 }
 
 /// The commit that `cargo package` wrote down.

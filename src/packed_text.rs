@@ -6,7 +6,7 @@ use flate2::read::DeflateDecoder;
 
 /// The compressed text of a file, by its name.
 macro_rules! packed {
-    ($name:expr) => {
+    ($name:literal) => {
         include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".z"))
     };
 }

@@ -36,14 +36,16 @@ pub(crate) struct DocumentKind {
     pub(crate) name: &'static str,
     /// Name and version as in the document itself.
     pub(crate) schema: &'static str,
-    /// The JSON Schema (2020-12), generated from the types; compressed.
-    packed: &'static [u8],
 }
 
 impl DocumentKind {
-    /// The JSON Schema.
+    /// The JSON Schema (2020-12), generated from the types.
     pub(crate) fn text(&self) -> String {
-        unpack(self.packed)
+        let all = unpack(packed!("schemas"));
+        let mut named = all.split('\0').filter_map(|schema| schema.split_once('\n'));
+        let found = named.find(|(name, _)| *name == self.name);
+        let (_, text) = found.expect("build.rs packed the schema of every document");
+        indented(text)
     }
 
     /// Description in one sentence.
@@ -56,13 +58,26 @@ impl DocumentKind {
     }
 }
 
+/// Lines of a JSON document, indented by two spaces for each level.
+fn indented(text: &str) -> String {
+    let mut indented = String::new();
+    let mut level = 0_usize;
+    for line in text.lines() {
+        level -= usize::from(line.starts_with(['}', ']']));
+        indented += &"  ".repeat(level);
+        indented += line;
+        indented.push('\n');
+        level += usize::from(line.ends_with(['{', '[']));
+    }
+    indented
+}
+
 macro_rules! documents {
     ($($name:literal: $schema:expr),* $(,)?) => {
         /// All documents.
         pub(crate) const DOCUMENTS: &[DocumentKind] = &[$(DocumentKind {
             name: $name,
             schema: $schema,
-            packed: packed!(concat!($name, ".json")),
         }),*];
     };
 }
