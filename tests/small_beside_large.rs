@@ -260,3 +260,40 @@ fn friction_on_the_first_of_two_inertias() {
     assert_eq!(names, ["coulomb-friction", "second-mode"]);
     check_parameter(&report, ("coulomb-friction", "torque"), 0.03);
 }
+
+/// A measured channel late by a 20th of a sample beside a line: a delay, and a low-pass far above half the rate, which the
+/// records do not tell apart.
+#[test]
+fn a_low_pass_beyond_the_rate_is_listed_beside_a_delay() {
+    let mut noise = Noise(37);
+    let records = [0.12, 0.08].map(|level| {
+        let (text, _) = record(|_, _, _| 0.0, (level, 50.0), &mut noise);
+        let mut measured = Vec::new();
+        changed(&text, |[_, _, y]| {
+            measured.push(y);
+            y
+        });
+        let last = measured.len() - 1;
+        let mut place = 0..;
+        // The parabola through a sample and its neighbours, a 20th of a sample before it.
+        changed(&text, |[time_s, _, y]| {
+            let k: usize = place.next().expect("a row");
+            let [before, after] = [k.saturating_sub(1), (k + 1).min(last)].map(|k| measured[k]);
+            let late = 0.02625 * before + 0.9975 * y - 0.02375 * after;
+            late + 0.004 * (TAU * 31.7 * time_s).sin()
+        })
+    });
+    let report = diagnosed(&records);
+    assert_eq!(report["verdict"], "explained");
+    let effects = report["effects"].to_string();
+    assert!(effects.contains("rotor-imbalance"), "{effects}");
+    let candidates = report["candidates"].as_array().expect("a list").iter();
+    let possible = |c: &&Value| c["status"] == "accepted" || c["status"] == "indistinguishable";
+    let names: Vec<&str> = candidates
+        .filter(possible)
+        .filter_map(|c| c["effect"].as_str())
+        .collect();
+    for name in ["time-delay", "recorder-lowpass"] {
+        assert!(names.contains(&name), "{names:?}");
+    }
+}

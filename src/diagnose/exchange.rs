@@ -119,15 +119,17 @@ impl SearchState {
                 found.extend(better.filter(passes));
             }
         }
-        let is_new = |model: &ScoredModel| {
-            let names = sorted(model);
-            let is_last = seen.last() == Some(&names);
-            !seen.contains(&names) || is_last && model.criterion() < self.after.criterion() - SAME
-        };
-        let found = found.into_iter().filter(is_new);
-        let best = found.min_by(|a, b| a.criterion().total_cmp(&b.criterion()));
+        found.retain(|model| self.is_new(model, seen));
         self.alike.extend(alike);
-        best
+        let found = found.into_iter();
+        found.min_by(|a, b| a.criterion().total_cmp(&b.criterion()))
+    }
+
+    /// Whether a model has other effects than all before, or better ones than the last with the same names.
+    fn is_new(&self, model: &ScoredModel, seen: &[Vec<&'static str>]) -> bool {
+        let names = sorted(model);
+        let is_last = seen.last() == Some(&names);
+        !seen.contains(&names) || is_last && model.criterion() < self.after.criterion() - SAME
     }
 
     /// Whether a model with one effect in place of another is better than the current one.

@@ -24,7 +24,7 @@ const WRAPS: usize = 2;
 const BESIDE: usize = 5;
 
 /// A step much larger than the others.
-struct Jump {
+struct WrapJump {
     /// Index of the sample before it.
     at: usize,
     step: f64,
@@ -32,7 +32,7 @@ struct Jump {
     usual: f64,
 }
 
-impl Jump {
+impl WrapJump {
     /// What makes the position continuous.
     fn span(&self) -> f64 {
         self.usual - self.step
@@ -52,7 +52,7 @@ impl Jump {
 }
 
 /// Steps beyond a size, unless there are too many.
-fn jumps(motion: &[f64], least: f64) -> Vec<Jump> {
+fn jumps(motion: &[f64], least: f64) -> Vec<WrapJump> {
     let steps: Vec<f64> = motion.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let usual = |at: usize| {
         let around = &steps[at.saturating_sub(BESIDE)..(at + BESIDE + 1).min(steps.len())];
@@ -60,12 +60,12 @@ fn jumps(motion: &[f64], least: f64) -> Vec<Jump> {
         around.clone().sum::<f64>() / around.count().max(1) as f64
     };
     let beyond = (0..steps.len()).filter(|at| steps[*at].abs() > least);
-    let all = beyond.map(|at| Jump {
+    let all = beyond.map(|at| WrapJump {
         at,
         step: steps[at],
         usual: usual(at),
     });
-    let all: Vec<Jump> = all.collect();
+    let all: Vec<WrapJump> = all.collect();
     match all.len() as f64 > SHARE * motion.len() as f64 {
         true => Vec::new(),
         false => all,
@@ -73,7 +73,7 @@ fn jumps(motion: &[f64], least: f64) -> Vec<Jump> {
 }
 
 /// The constant span of all jumps, if it is the range of the positions, as of a counter that begins again.
-fn constant_span(jumps: &[Jump], range: f64) -> Option<f64> {
+fn constant_span(jumps: &[WrapJump], range: f64) -> Option<f64> {
     let spans = || jumps.iter().map(|jump| jump.span().abs());
     let mean = spans().sum::<f64>() / jumps.len() as f64;
     let step = jumps.iter().map(|jump| jump.usual.abs());
@@ -98,7 +98,7 @@ pub(super) fn continuous<'a>(
         true => jumps(run.motion, CONTINUOUS),
         false => Vec::new(),
     };
-    let whole: Option<Vec<f64>> = turns.iter().map(Jump::whole_turns).collect();
+    let whole: Option<Vec<f64>> = turns.iter().map(WrapJump::whole_turns).collect();
     if let Some(whole) = whole.filter(|whole| !whole.is_empty()) {
         let count = plural(whole.len(), "time");
         let method = format!(
@@ -140,7 +140,7 @@ pub(super) fn continuous<'a>(
 }
 
 /// Positions with spans added from each jump on.
-fn joined(motion: &[f64], jumps: &[Jump], spans: &[f64]) -> Vec<f64> {
+fn joined(motion: &[f64], jumps: &[WrapJump], spans: &[f64]) -> Vec<f64> {
     let mut wraps = jumps.iter().zip(spans).peekable();
     let mut added = 0.0;
     let position = |(i, position): (usize, &f64)| {

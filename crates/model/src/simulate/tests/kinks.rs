@@ -14,10 +14,8 @@ fn a_signal_with_kinks_is_filtered_before_it_is_sampled() {
         let acceleration = w * w * (input_at(t) - shown) - 2.0 * MODE.damping_ratio * w * v;
         [TAU * CUTOFF_HZ * (shown - filtered), v, acceleration]
     });
-    let (gap, low_pass): ((&str, &str, &[f64]), (&str, &str, &[f64])) = (
-        ("backlash", "gap", &[GAP]),
-        ("recorder-lowpass", "order-1", &[CUTOFF_HZ]),
-    );
+    let gap: (&str, &str, &[f64]) = ("backlash", "gap", &[GAP]);
+    let low_pass: (&str, &str, &[f64]) = ("recorder-lowpass", "order-1", &[CUTOFF_HZ]);
     let input = input(24);
     // The samples alone, filtered.
     let sampled = chain(&[gap]).simulate(&input, MotionState::default());
