@@ -256,7 +256,6 @@ impl ScoredModel {
         let own_effect = &structure.effects[effect];
         let parameters = &own_effect.form.parameters[..own_effect.moved()];
         let own = || parameters.iter().enumerate();
-        let is_shown = own_effect.outdoes_special_cases;
         let is_zero = |k: usize| {
             let value = fitted.values[first + k];
             let is_at_bound = value >= (1.0 - AT_BOUND) * parameters[k].upper;
@@ -272,7 +271,7 @@ impl ScoredModel {
             std.is_some_and(|std| fitted.values[first + k].abs() < std)
         };
         own()
-            .find(|(k, p)| p.essential && !is_shown && is_zero(*k) || is_no_size(*k))
+            .find(|(k, p)| p.essential && is_zero(*k) || is_no_size(*k))
             .map(|(_, p)| p.name)
     }
 

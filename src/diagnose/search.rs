@@ -13,7 +13,7 @@ use super::fit::{FitEffort, FittedModel, fit};
 use super::reason::{Reason, Status};
 use super::records::Records;
 use super::score::{BaseModel, EffectParameter, ScoredModel};
-use super::special_cases::{compare_special_cases, fit_special_cases};
+use super::special_cases::fit_special_cases;
 use super::spectra::{SpectralLine, lines_of};
 use super::starts::{Start, best_starts};
 use super::structure::{EffectForm, Structure};
@@ -336,7 +336,6 @@ pub fn fit_all(
     let promising = (fitted.train_sum, least);
     fit_special_cases(forms, &mut fits, promising, records, workers);
     fit_near_best(&mut fits, records, workers);
-    compare_special_cases(&mut fits);
     fits
 }
 

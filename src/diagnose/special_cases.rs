@@ -16,9 +16,6 @@ const SPECIAL_CASE: FitEffort = FitEffort::full(15);
 /// refit.
 const LESS: f64 = 0.99;
 
-/// Significance from which an effect explains more than its special cases.
-const CLEARLY: f64 = 4.0;
-
 /// Refits the forms whose residual is larger than that of the best general case, if that gains at least the given
 /// amount.
 pub fn fit_special_cases(
@@ -49,39 +46,6 @@ pub fn fit_special_cases(
     for ((k, _), fit) in anew.into_iter().zip(found) {
         if fit.is_some() {
             fits[k] = fit;
-        }
-    }
-}
-
-/// Marks the effects with a parameter near zero in terms of its uncertainty that nonetheless explain significantly more
-/// than every special case of theirs: where only `drop/v_s²` matters, for one, `drop` and `v_s` are uncertain.
-pub fn compare_special_cases(fits: &mut [Option<ScoredModel>]) {
-    let last = |model: &ScoredModel| model.fitted.structure.effects.last().copied();
-    let outdoes = |general: &ScoredModel| {
-        let is_uncertain = general.insignificant_parameter().is_some();
-        let Some(own) = last(general).filter(|_| is_uncertain) else {
-            return false;
-        };
-        let is_special =
-            |model: &&ScoredModel| last(model).is_some_and(|f| f.is_special_case_of(&own));
-        let mut specials = fits.iter().flatten().filter(is_special).peekable();
-        let general = general.clone().with_samples();
-        specials.peek().is_some()
-            && specials.all(|special| {
-                general.criterion() < special.criterion() - SAME
-                    && general.against(special).significance() >= CLEARLY
-            })
-    };
-    let found: Vec<bool> = fits
-        .iter()
-        .map(|fit| fit.as_ref().is_some_and(outdoes))
-        .collect();
-    for (fit, found) in fits.iter_mut().zip(found) {
-        let own = fit
-            .as_mut()
-            .and_then(|model| model.fitted.structure.effects.last_mut());
-        if let Some(own) = own.filter(|_| found) {
-            own.outdoes_special_cases = true;
         }
     }
 }

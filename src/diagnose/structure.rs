@@ -165,19 +165,12 @@ impl FitContext {
 pub struct EffectForm {
     pub effect: &'static Effect,
     pub form: &'static Form,
-    /// Whether no special case of it explains the records as well: then it is significant, whatever the uncertainties of its
-    /// parameters, which may be large where the records determine only a combination of several.
-    pub outdoes_special_cases: bool,
 }
 
 impl EffectForm {
     /// An effect in one of its forms.
     pub fn new(effect: &'static Effect, form: &'static Form) -> Self {
-        Self {
-            effect,
-            form,
-            outdoes_special_cases: false,
-        }
+        Self { effect, form }
     }
 
     /// All forms of some effects.
