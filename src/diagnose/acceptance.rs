@@ -67,7 +67,11 @@ fn no_gain_by(
 
 /// Whether held-out records bear out, with 95 % confidence, that a model is better than a simpler one.
 pub fn is_confirmed(model: &ScoredModel, before: &ScoredModel) -> bool {
-    model.against(before).significance() >= CERTAIN
+    let comparison = model.against(before);
+    match no_gain_by(&comparison, model, before) {
+        Some(Reason::NotSignificant { .. }) => comparison.significance() >= CERTAIN,
+        reason => reason.is_none(),
+    }
 }
 
 /// Ratio of a gain, for the number of parameters and samples, to what [`refusal`] requires, whatever the noise, with 95

@@ -69,7 +69,7 @@ pub fn detection_limits(found: &SearchState, threads: usize) -> Vec<DetectionLim
     let limits = parallel(effects.len(), threads, |k| {
         let effect = effects[k];
         let form = effect.forms.first()?;
-        Amount::of(&base, EffectForm::new(effect, form)).map(|a| a.limit(&base, &training))
+        Amount::of(&base, EffectForm { effect, form }).map(|a| a.limit(&base, &training))
     });
     limits.into_iter().flatten().collect()
 }

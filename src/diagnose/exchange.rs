@@ -222,14 +222,14 @@ impl SearchState {
     pub(super) fn report_exchanged(&mut self) {
         let names = self.after.effect_names();
         let alike = std::mem::take(&mut self.alike);
+        // What the records keep of their history says nothing of the effect.
+        let count = |model: &ScoredModel| model.fitted.values.len();
         for model in self.path.iter().chain(&alike) {
             let of_model = model.effect_names();
             let [gone, new] = [(&of_model, &names), (&names, &of_model)].map(|(some, others)| {
                 let mut own = some.iter().filter(|name| !others.contains(name));
                 own.next().filter(|_| own.next().is_none())
             });
-            // What the records keep of their history says nothing of the effect.
-            let count = |model: &ScoredModel| model.fitted.values.len();
             if let (Some(gone), Some(best)) = (gone, new)
                 && count(model) <= count(&self.after)
                 && model.clone().with_samples().is_no_worse_than(&self.after)
@@ -255,7 +255,10 @@ impl SearchState {
     fn with_gain(&self, workers: Workers) -> Option<ScoredModel> {
         let gain = listed(&self.after.fitted.structure).find(|effect| effect.name == GAIN);
         let effect = gain.filter(|_| self.has_room())?;
-        let gain = EffectForm::new(effect, &effect.forms[0]);
+        let gain = EffectForm {
+            effect,
+            form: &effect.forms[0],
+        };
         let starts = self.after.with_gain_in_other_forms(gain);
         self.best_from(&starts, workers, |model| {
             refusal(model, &self.after).is_none() && !self.excess().is_too_small(&self.after, model)

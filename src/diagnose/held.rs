@@ -120,7 +120,7 @@ fn warning(context: &FitContext, stiffness: f64) -> Warning {
 }
 
 /// RMS of several series together, each about its mean.
-fn rms<'a>(series: impl Iterator<Item = &'a [f64]>) -> f64 {
+pub fn rms<'a>(series: impl Iterator<Item = &'a [f64]>) -> f64 {
     let (mut sum, mut count) = (0.0, 0_usize);
     for values in series {
         sum += without_mean(values).iter().map(|v| v * v).sum::<f64>();

@@ -129,7 +129,7 @@ fn refuse_sign_or_unit(case: &Case, context: &FitContext, as_given: f64) -> Resu
     };
     Err(ErrorCode::UnsuitableRecord.failed(format_args!(
         "{}: the measured torque {what}: a stand fitted to it as it is has an error of {}, one with that factor {}; \
-     {remedy}",
+         {remedy}",
         train[0].source,
         relative(as_given, 2),
         relative(scaled, 2)

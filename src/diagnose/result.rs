@@ -7,8 +7,9 @@ use torqcomp_dsp::sort_by_number;
 use super::constants::{StandConstant, constants};
 use super::describe;
 use super::detection::{DetectionLimit, detection_limits};
+use super::fit::RecordResidual;
 use super::guard_models::GuardModel;
-use super::held::HeldBody;
+use super::held::{HeldBody, rms};
 use super::known_loads::LoadCheck;
 use super::ladder::Ladder;
 use super::moment::ChangedStand;
@@ -258,15 +259,12 @@ impl ScoredModel {
         if self.fitted.structure.context.held.is_some() {
             return HeldBody::acting_rms(self.compared().iter().map(|r| &r.record));
         }
-        let (mut sum, mut count) = (0.0, 0_usize);
-        for residual in self.compared().iter() {
+        let measured = |residual: &RecordResidual| -> Vec<f64> {
             let pairs = residual.modelled.iter().zip(&residual.samples);
-            let y: Vec<f64> = pairs.map(|(m, r)| m + r).collect();
-            let mean = y.iter().sum::<f64>() / y.len() as f64;
-            sum += y.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
-            count += y.len();
-        }
-        (sum / count as f64).sqrt()
+            pairs.map(|(m, r)| m + r).collect()
+        };
+        let all: Vec<Vec<f64>> = self.compared().iter().map(measured).collect();
+        rms(all.iter().map(Vec::as_slice))
     }
 }
 

@@ -302,9 +302,9 @@ impl SearchState {
         let noise = AppliedNoise::of(&self.records);
         let declared = after.fitted.structure.declared;
         let is_training = self.records.holdout.is_empty();
-        let has_no_gain = |less: &ScoredModel| match no_gain(after, less) {
-            Some(Reason::NotSignificant { .. }) if !is_training => !is_confirmed(after, less),
-            reason => reason.is_some(),
+        let has_no_gain = |less: &ScoredModel| match is_training {
+            true => no_gain(after, less).is_some(),
+            false => !is_confirmed(after, less),
         };
         let is_needless = |k: usize, less: &ScoredModel| {
             has_no_gain(less)

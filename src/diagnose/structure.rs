@@ -168,16 +168,11 @@ pub struct EffectForm {
 }
 
 impl EffectForm {
-    /// An effect in one of its forms.
-    pub fn new(effect: &'static Effect, form: &'static Form) -> Self {
-        Self { effect, form }
-    }
-
     /// All forms of some effects.
     pub fn all(effects: impl IntoIterator<Item = &'static Effect>) -> Vec<Self> {
         let forms = |effect: &'static Effect| {
             let forms = effect.forms.iter();
-            forms.map(move |form| Self::new(effect, form))
+            forms.map(move |form| Self { effect, form })
         };
         effects.into_iter().flat_map(forms).collect()
     }

@@ -72,7 +72,10 @@ pub(super) fn torques_unknown(
 pub(super) fn declared_effects(stand: Option<&Stand>) -> Vec<DeclaredForm> {
     let effects = stand.map_or(&[][..], |stand| &stand.effects);
     let form = |declared: &DeclaredEffect| DeclaredForm {
-        effect: EffectForm::new(declared.effect, declared.form),
+        effect: EffectForm {
+            effect: declared.effect,
+            form: declared.form,
+        },
         values: declared.values.clone(),
     };
     effects.iter().map(form).collect()

@@ -89,7 +89,7 @@ pub(super) fn off_line(
 }
 
 /// Zero and slope of the straight line through points, and its residual; not a number where all loads are the same.
-fn straight(points: &[Point]) -> ([f64; 2], f64) {
+pub(super) fn straight(points: &[Point]) -> ([f64; 2], f64) {
     let line = line(points);
     let left: Vec<f64> = points
         .iter()

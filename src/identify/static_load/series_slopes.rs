@@ -3,6 +3,7 @@
 use super::groups::Groups;
 use super::linear::{LEAST_CHANGE, TWO_RANGES};
 use super::mixed::last_digits;
+use super::outlier::straight;
 use super::{LoadUnits, NONE, Point};
 use crate::failure::{ErrorCode, Failure};
 use crate::print::rounded;
@@ -22,21 +23,16 @@ struct GroupLine {
 }
 
 impl GroupLine {
-    fn of(number: usize, points: &[&Point]) -> Option<Self> {
+    fn of(number: usize, points: &[Point]) -> Option<Self> {
         let count = points.len() as f64;
-        let mean = |of: fn(&Point) -> f64| points.iter().map(|p| of(p)).sum::<f64>() / count;
-        let (load, reading) = (mean(|p| p.load), mean(|p| p.reading));
+        let load = points.iter().map(|p| p.load).sum::<f64>() / count;
         let squares: f64 = points.iter().map(|p| (p.load - load).powi(2)).sum();
-        let products = points
-            .iter()
-            .map(|p| (p.load - load) * (p.reading - reading));
-        let slope = products.sum::<f64>() / squares;
-        let off = |p: &&Point| (p.reading - reading - slope * (p.load - load)).powi(2);
-        (points.len() >= FEWEST && squares > 0.0).then(|| Self {
+        let ([_, slope], left) = straight(points);
+        (points.len() >= FEWEST && squares > 0.0).then_some(Self {
             number,
             slope,
             squares,
-            left: points.iter().map(off).sum(),
+            left: count * left * left,
         })
     }
 }
@@ -51,7 +47,7 @@ pub(super) fn refuse(points: &[Point], largest: f64, units: &LoadUnits) -> Resul
     // A gain changes the zero as well, and readings of it are of the series before or after.
     let rows = points.iter().zip(&groups.of_row);
     for (point, group) in rows.filter(|(point, _)| point.load.abs() > NONE * largest) {
-        members[*group].push(point);
+        members[*group].push(*point);
     }
     let lines = (1..).zip(&members);
     let lines = lines.filter_map(|(number, points)| GroupLine::of(number, points));
